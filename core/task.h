@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/direction.h"
+#include "core/lattice.h"
+#include "core/pose.h"
+
+namespace feeler {
+
+/// An axis along which the pose of the target is uncertain.
+enum class AxisKind { kX, kY, kZ, kYaw, kPitch };
+std::string_view ToString(AxisKind kind);
+
+struct UncertainAxis {
+  AxisKind kind = AxisKind::kX;
+  double resolution = 0.002;  ///< lattice spacing, m or rad
+  int min_cells = 2;          ///< smallest extent of a start belief along this axis, in hypotheses
+  int max_cells = 15;         ///< largest extent
+  bool angular() const { return kind == AxisKind::kYaw || kind == AxisKind::kPitch; }
+};
+
+/// Cost of a guarded move = per_cell * cells travelled + per_contact * contact + per_action.
+struct CostWeights {
+  double per_cell = 1.0;
+  double per_contact = 0.0;
+  double per_action = 0.0;
+  double Of(const Outcome& outcome) const {
+    return per_cell * outcome.cells + (outcome.contact ? per_contact : 0.0) + per_action;
+  }
+  bool operator==(const CostWeights&) const = default;
+};
+
+/// When a belief counts as localized: one hypothesis left (the paper's), or all that are left are inserted by one
+/// motion within the tolerance of the task.
+enum class GoalKind { kSingleton, kInsertable };
+std::string_view ToString(GoalKind kind);
+
+/// Largest error of the estimated target pose with which an insertion still succeeds.
+struct Tolerance {
+  double lateral_m = 0.001;   ///< across the insertion axis
+  double vertical_m = 0.002;  ///< along the insertion axis
+  double angle_rad = 0.03;
+};
+
+/// What is inserted into what: the numbers of a task file (docs/task-file.md), without its geometry.
+///
+/// Frames: the tool frame sits at the reference point of the tool (the tip of a plug), the target frame at the mouth of
+/// the opening, axes parallel when aligned; with coinciding frames the tool is about to enter along `insertion`.
+/// Lattice: the tool at lattice cell r and the target at hypothesis offset h are displaced by
+/// (r - h + phase) * cell_m in the axes of the estimated target frame.
+struct Task {
+  std::string name;
+  std::string file;  ///< path of the task file it came from
+  std::vector<UncertainAxis> axes;
+  double cell_m = 0.002;                    ///< lattice spacing of positions and of guarded moves
+  Eigen::Vector3d start_offset_m{0, 0, 0};  ///< tool frame from the centre of the hypotheses at the start pose
+  Direction insertion = Direction::kMinusZ;
+  double insertion_depth_m = 0.0;  ///< travel from the mouth to fully inserted
+  Tolerance tolerance;
+  CostWeights cost;
+  GoalKind goal = GoalKind::kSingleton;
+  std::vector<int> move_lengths = {1, 2, 4, 8, 16};
+  Eigen::Vector3d workspace_m{0.2, 0.2, 0.1};  ///< half extents of the workspace of the tool around the start pose
+  Pose world_T_target = Pose::Identity();      ///< nominal pose of the target, as the file places it
+  Pose flange_T_tool = Pose::Identity();       ///< how the robot holds the tool
+};
+
+}  // namespace feeler
