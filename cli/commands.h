@@ -1,0 +1,16 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "cli/session.h"
+
+namespace feeler::cli {
+
+// One function a subcommand, each in a file of its own. The session outlives the app.
+void AddTaskCommand(CLI::App& app, Session& session);
+void AddSolveCommand(CLI::App& app, Session& session);
+void AddPreprocessCommand(CLI::App& app, Session& session);
+void AddDbCommand(CLI::App& app, Session& session);
+void AddRunCommand(CLI::App& app, Session& session);
+
+}  // namespace feeler::cli

@@ -1,0 +1,103 @@
+#include "evaluation/experiment_output.h"
+
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "core/error.h"
+
+namespace feeler::evaluation {
+namespace {
+
+std::string CsvCell(const nlohmann::json& value) {
+  if (value.is_null()) return "";
+  const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+nlohmann::json Machine() {
+  std::string processor = "unknown";
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  for (std::string line; std::getline(cpuinfo, line);) {
+    if (line.starts_with("model name")) {
+      processor = line.substr(line.find(':') + 2);
+      break;
+    }
+  }
+  utsname system{};
+  uname(&system);
+  return {{"processor", processor},
+          {"cores", std::thread::hardware_concurrency()},
+          {"memory_bytes", static_cast<std::int64_t>(sysconf(_SC_PHYS_PAGES)) * sysconf(_SC_PAGE_SIZE)},
+          {"system", std::string(system.sysname) + " " + system.machine}};
+}
+
+}  // namespace
+
+nlohmann::json ManifestJson(const Manifest& manifest) {
+  return {{"version", FEELER_VERSION},
+          {"command", manifest.command},
+          {"settings", manifest.settings},
+          {"seeds", manifest.seeds},
+          {"machine", Machine()}};
+}
+
+std::string ToCsv(const ResultTable& table) {
+  std::string csv;
+  for (std::size_t i = 0; i < table.columns.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(table.columns[i]);
+  csv += "\n";
+  for (const auto& row : table.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(row[i]);
+    csv += "\n";
+  }
+  return csv;
+}
+
+void WriteFileAtomically(const std::string& path, const std::string& content) {
+  const std::string temporary = path + ".part" + std::to_string(getpid());
+  {
+    std::ofstream out(temporary, std::ios::binary);
+    out << content;
+    out.flush();
+    if (!out) {
+      std::remove(temporary.c_str());
+      throw InputError(path, "cannot be written", "check the folder, its permissions and the free space");
+    }
+  }
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  if (error) {
+    std::remove(temporary.c_str());
+    throw InputError(path, "cannot be replaced: " + error.message(), "choose another place");
+  }
+}
+
+void WriteExperiment(const std::string& folder, const std::string& name, const ResultTable& table,
+                     const nlohmann::json& details, const Manifest& manifest) {
+  for (const auto& row : table.rows) {
+    if (row.size() != table.columns.size()) {
+      throw InputError("experiment " + name, "a row has " + std::to_string(row.size()) + " cells for " +
+                                                 std::to_string(table.columns.size()) + " columns");
+    }
+  }
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be created: " + error.message(), "choose another folder");
+  const nlohmann::json document = {
+      {"name", name}, {"columns", table.columns}, {"rows", table.rows}, {"details", details}};
+  WriteFileAtomically(folder + "/" + name + ".csv", ToCsv(table));
+  WriteFileAtomically(folder + "/" + name + ".json", document.dump(2) + "\n");
+  WriteFileAtomically(folder + "/manifest.json", ManifestJson(manifest).dump(2) + "\n");
+}
+
+}  // namespace feeler::evaluation

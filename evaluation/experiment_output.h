@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace feeler::evaluation {
+
+/// Where a result came from: enough to run it again and to judge its times.
+struct Manifest {
+  std::string command;      ///< as typed
+  nlohmann::json settings;  ///< every option that shaped the result
+  std::vector<std::uint64_t> seeds;
+};
+
+/// A table: one JSON scalar per cell, as many cells in a row as there are columns.
+struct ResultTable {
+  std::vector<std::string> columns;
+  std::vector<std::vector<nlohmann::json>> rows;
+};
+
+/// `{"version", "command", "settings", "seeds", "machine": {"processor", "cores", "memory_bytes", "system"}}`
+nlohmann::json ManifestJson(const Manifest& manifest);
+
+/// Writes NAME.csv (the table), NAME.json (table and details) and manifest.json into `folder`, created if missing; each
+/// file is replaced whole or not at all. Throws InputError if the folder cannot be written or a row has a wrong length.
+void WriteExperiment(const std::string& folder, const std::string& name, const ResultTable& table,
+                     const nlohmann::json& details, const Manifest& manifest);
+
+/// CSV of a table (RFC 4180 quoting).
+std::string ToCsv(const ResultTable& table);
+
+/// Replaces the file at `path` whole or not at all. Throws InputError if it cannot be written.
+void WriteFileAtomically(const std::string& path, const std::string& content);
+
+}  // namespace feeler::evaluation
