@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "core/parallelism.h"
+#include "core/progress.h"
+#include "core/task.h"
+#include "planner/preprocess/problem_family.h"
+#include "planner/solver/solve.h"
+
+namespace feeler::planner {
+
+/// Where finished policies go (the database). Calls are serial, from any of the working threads.
+class PolicySink {
+ public:
+  virtual ~PolicySink() = default;
+  /// True if this problem is done (an earlier run stored it): it is skipped.
+  virtual bool Done(const Extents& extents) = 0;
+  /// The stored policy of a problem that is done, as experience for others; empty if it has none.
+  virtual std::optional<Policy> Load(const Extents& extents) = 0;
+  /// A problem is finished, complete or not. The sequence of calls depends on the threads, their content does not.
+  virtual void Store(const Extents& extents, const Problem& problem, const SolverResult& result) = 0;
+};
+
+struct PreprocessOptions {
+  SolverOptions solver;  ///< cancellation and on_bounds of it are ignored
+  ProblemOrder order = ProblemOrder::kUncertainty;
+  ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
+  std::uint64_t seed = 1;                                ///< of the random order
+  Parallelism jobs;
+  const CancellationToken* cancellation = nullptr;  ///< problems in flight are dropped
+  ProgressCallback progress;                        ///< problems done, of all
+};
+
+struct PreprocessSummary {
+  std::int64_t problems = 0;
+  std::int64_t skipped = 0;   ///< done by an earlier run
+  std::int64_t complete = 0;  ///< solved in this run with a complete policy
+  std::int64_t failed = 0;    ///< no complete policy within the limits, or unlocalizable
+  bool cancelled = false;
+  double wall_s = 0.0;
+  double cpu_s = 0.0;  ///< summed over problems
+};
+
+/// Algorithm 3: solves the problems of a family in order, each with the most similar solved problem as experience, and
+/// hands every policy to the sink. Threads work along the real dependencies; the results are the same for any number of
+/// jobs and after a resume (what a time limit stopped is exempt).
+PreprocessSummary Preprocess(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
+                             const PreprocessOptions& options, PolicySink& sink);
+
+}  // namespace feeler::planner

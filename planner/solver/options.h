@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string_view>
+
+#include "core/progress.h"
+
+namespace feeler::planner {
+
+enum class SolverKind { kRtdpBel, kERtdpBel, kCertified };
+enum class HeuristicKind {
+  kCertificate,   ///< mean cost to tell each hypothesis from its neighbours: tight, the default
+  kLines,         ///< exact values of lines of hypotheses: medium, the paper setting
+  kFirstContact,  ///< distance to the first possible contact: weak
+};
+/// "rtdp-bel", "e-rtdp-bel", "certified"; "certificate", "lines", "first-contact".
+std::string_view ToString(SolverKind kind);
+std::string_view ToString(HeuristicKind kind);
+
+/// One row of the bounds table that a solver reports as it goes.
+struct BoundsRow {
+  double wall_s = 0.0;
+  std::int64_t trials = 0;
+  std::int64_t expansions = 0;
+  double lower_bound = 0.0;
+  double upper_bound = std::numeric_limits<double>::infinity();  ///< exact cost of the best complete policy so far
+  double Ratio() const {
+    return lower_bound > 0.0            ? upper_bound / lower_bound
+           : upper_bound == lower_bound ? 1.0
+                                        : std::numeric_limits<double>::infinity();
+  }
+};
+
+struct SolverOptions {
+  SolverKind solver = SolverKind::kCertified;
+  /// RTDP-Bel and E-RTDP-Bel: inflation of the heuristic; the policy costs at most epsilon times the optimum. >= 1.
+  double epsilon = 1.2;
+  /// Certified solver: stop when expected cost <= gap * lower bound. >= 1; 1 proves optimality.
+  double gap = 1.2;
+  double time_limit_s = std::numeric_limits<double>::infinity();            ///< wall time; > 0
+  std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();  ///< the deterministic budget; >= 1
+  std::uint64_t seed = 1;
+  HeuristicKind heuristic = HeuristicKind::kCertificate;
+  /// Beliefs that are translates of each other count as one. Only used where that is exact: uniform weights, a generous
+  /// workspace. Off is the paper's setting. E-RTDP-Bel always works without.
+  bool canonical_translation = true;
+  const CancellationToken* cancellation = nullptr;  ///< may be null
+  std::function<void(const BoundsRow&)> on_bounds;  ///< the bounds table; may be empty; called from the solving thread
+};
+
+/// Throws InputError naming the option if one is out of range or not a number.
+void Validate(const SolverOptions& options);
+
+/// The paper's algorithms as printed: no canonical translation, lines of hypotheses.
+SolverOptions PaperSetting(SolverKind solver, double epsilon);
+/// Canonical translation and the certificate heuristic.
+SolverOptions FastSetting(SolverKind solver, double epsilon);
+
+}  // namespace feeler::planner
