@@ -1,5 +1,8 @@
 #include "core/task.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace feeler {
 
 std::string_view ToString(AxisKind kind) {
@@ -14,5 +17,52 @@ std::string_view ToString(AxisKind kind) {
 }
 
 std::string_view ToString(GoalKind kind) { return kind == GoalKind::kSingleton ? "singleton" : "insertable"; }
+
+Cell CuboidOf(const Task& task, const std::vector<int>& extents) {
+  Cell cuboid = Cell::Ones();
+  for (std::size_t i = 0; i < task.axes.size() && i < extents.size(); ++i) {
+    if (!task.axes[i].angular()) cuboid[static_cast<int>(task.axes[i].kind)] = extents[i];
+  }
+  return cuboid;
+}
+
+Cell LargestCuboid(const Task& task) {
+  std::vector<int> extents;
+  for (const UncertainAxis& axis : task.axes) extents.push_back(axis.max_cells);
+  return CuboidOf(task, extents);
+}
+
+Cell StartCell(const Task& task, const Cell& cuboid) {
+  // The small number keeps a whole number of cells whole when the division rounds down.
+  Cell start;
+  for (int axis = 0; axis < 3; ++axis) {
+    start[axis] =
+        static_cast<int>(std::floor((cuboid[axis] - 1) / 2.0 + task.start_offset_m[axis] / task.cell_m + 1e-9));
+  }
+  return start;
+}
+
+CellBox WorkspaceCells(const Task& task, const Cell& cuboid) {
+  const Cell start = StartCell(task, cuboid);
+  Cell half;
+  for (int axis = 0; axis < 3; ++axis) {
+    half[axis] = static_cast<int>(std::floor(task.workspace_m[axis] / task.cell_m + 1e-9));
+  }
+  return {start - half, start + half};
+}
+
+CellBox DisplacementsOf(const Task& task) {
+  // Along each axis the ends are met by the largest extents; extents one smaller shift the start by half a cell, so
+  // both parities are looked at.
+  std::vector<int> smaller;
+  for (const UncertainAxis& axis : task.axes) smaller.push_back(std::max(axis.min_cells, axis.max_cells - 1));
+  CellBox all{Cell::Constant(1 << 28), Cell::Constant(-(1 << 28))};
+  for (const Cell& cuboid : {LargestCuboid(task), CuboidOf(task, smaller)}) {
+    const CellBox workspace = WorkspaceCells(task, cuboid);
+    all.min = all.min.cwiseMin(workspace.min - (cuboid - Cell::Ones()));
+    all.max = all.max.cwiseMax(workspace.max);
+  }
+  return all;
+}
 
 }  // namespace feeler

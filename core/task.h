@@ -68,4 +68,17 @@ struct Task {
   Pose flange_T_tool = Pose::Identity();       ///< how the robot holds the tool
 };
 
+/// Number of hypotheses along x, y and z at the extents given for the uncertain axes of the task (1 along a certain
+/// axis), in the order of task.axes. Angular axes do not count.
+Cell CuboidOf(const Task& task, const std::vector<int>& extents);
+/// The largest cuboid of hypotheses of the task.
+Cell LargestCuboid(const Task& task);
+/// Lattice cell of the tool at the start pose of a problem with a cuboid of `cuboid` hypotheses:
+/// floor((n - 1)/2 + start_offset/cell) per axis.
+Cell StartCell(const Task& task, const Cell& cuboid);
+/// The cells that the tool may be in for that problem: workspace_m around the start cell.
+CellBox WorkspaceCells(const Task& task, const Cell& cuboid);
+/// Every displacement r - h that some problem of the task can meet.
+CellBox DisplacementsOf(const Task& task);
+
 }  // namespace feeler
