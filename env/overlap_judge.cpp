@@ -1,0 +1,79 @@
+#include "env/overlap_judge.h"
+
+#include <array>
+#include <utility>
+
+namespace feeler::env {
+namespace {
+
+void Place(mjData& data, int geom, const Pose& pose) {
+  Eigen::Map<Eigen::Vector3d>(data.geom_xpos + 3 * geom) = pose.translation();
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data.geom_xmat + 9 * geom) = pose.linear();
+}
+
+}  // namespace
+
+Pose GeomInBody(const mjData& data, int geom, int body) {
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  Pose world_T_geom = Pose::Identity();
+  world_T_geom.translation() = Eigen::Map<const Eigen::Vector3d>(data.geom_xpos + 3 * geom);
+  world_T_geom.linear() = Eigen::Map<const RowMajor>(data.geom_xmat + 9 * geom);
+  Pose world_T_body = Pose::Identity();
+  world_T_body.translation() = Eigen::Map<const Eigen::Vector3d>(data.xpos + 3 * body);
+  world_T_body.linear() = Eigen::Map<const RowMajor>(data.xmat + 9 * body);
+  return world_T_body.inverse(Eigen::Isometry) * world_T_geom;
+}
+
+OverlapJudge::OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
+                           const Eigen::Quaterniond& orientation)
+    : model_(mj_copyModel(nullptr, task_model.model.get()), ModelDeleter()),
+      data_(MakeData(*model_)),
+      tool_geoms_(task_model.tool_geoms),
+      target_geoms_(std::move(target_geoms)),
+      tool_position_m_(static_cast<std::size_t>(model_->ngeom), Eigen::Vector3d::Zero()) {
+  // The default tolerance of the convex collider, 1e-6 m, is half of the accuracy asked of travel distances.
+  model_->opt.mpr_tolerance = 1e-8;
+  model_->opt.mpr_iterations = 200;
+  mj_kinematics(model_.get(), data_.get());
+  std::vector<std::pair<int, Pose>> placed;
+  for (const int geom : tool_geoms_) {
+    placed.emplace_back(geom, GeomInBody(*data_, geom, task_model.tool_body));
+    tool_position_m_[static_cast<std::size_t>(geom)] = placed.back().second.translation();
+  }
+  for (const int geom : target_geoms_) {
+    placed.emplace_back(
+        geom, MakePose(Eigen::Vector3d::Zero(), orientation) * GeomInBody(*data_, geom, task_model.target_body));
+  }
+  for (const auto& [geom, pose] : placed) Place(*data_, geom, pose);
+}
+
+bool OverlapJudge::Overlap(int tool_geom, int target_geom, const Eigen::Vector3d& displacement_m) {
+  Eigen::Map<Eigen::Vector3d>(data_->geom_xpos + 3 * tool_geom) =
+      tool_position_m_[static_cast<std::size_t>(tool_geom)] + displacement_m;
+  int first = tool_geom;
+  int second = target_geom;
+  if (model_->geom_type[first] > model_->geom_type[second]) std::swap(first, second);
+  const mjfCollision collide = mjCOLLISIONFUNC[model_->geom_type[first]][model_->geom_type[second]];
+  std::array<mjContact, mjMAXCONPAIR> contacts;
+  const int count = collide(model_.get(), data_.get(), contacts.data(), first, second, 0.0);
+  for (int i = 0; i < count; ++i) {
+    if (contacts[static_cast<std::size_t>(i)].dist < 0) return true;
+  }
+  return false;
+}
+
+bool OverlapJudge::Overlap(const Eigen::Vector3d& displacement_m) {
+  for (const int tool_geom : tool_geoms_) {
+    for (const int target_geom : target_geoms_) {
+      const double reach = model_->geom_rbound[tool_geom] + model_->geom_rbound[target_geom];
+      const bool plane = model_->geom_type[target_geom] == mjGEOM_PLANE;
+      const Eigen::Vector3d between = tool_position_m_[static_cast<std::size_t>(tool_geom)] + displacement_m -
+                                      Eigen::Map<const Eigen::Vector3d>(data_->geom_xpos + 3 * target_geom);
+      if (!plane && between.squaredNorm() > reach * reach) continue;
+      if (Overlap(tool_geom, target_geom, displacement_m)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace feeler::env

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <memory>
+#include <vector>
+
+#include "core/pose.h"
+#include "env/mujoco_handles.h"
+#include "env/task_file.h"
+
+namespace feeler::env {
+
+/// Tells by MuJoCo's collision detection whether tool and target of a task overlap when the tool frame is displaced
+/// from the target frame (axes of the estimated target frame). Touching is not overlapping. One thread at a time; make
+/// one per thread.
+class OverlapJudge {
+ public:
+  /// `orientation`: of the target in the estimated target frame. `target_geoms`: ids in task_model.model.
+  OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
+               const Eigen::Quaterniond& orientation = Eigen::Quaterniond::Identity());
+
+  /// Of one pair of geoms (ids in the model).
+  bool Overlap(int tool_geom, int target_geom, const Eigen::Vector3d& displacement_m);
+  /// Of any pair.
+  bool Overlap(const Eigen::Vector3d& displacement_m);
+
+ private:
+  std::shared_ptr<mjModel> model_;
+  DataHandle data_;
+  std::vector<int> tool_geoms_;
+  std::vector<int> target_geoms_;
+  std::vector<Eigen::Vector3d> tool_position_m_;  ///< in the tool frame, by geom id
+};
+
+/// Pose of a geom in the frame of a body, in the state of `data`.
+Pose GeomInBody(const mjData& data, int geom, int body);
+
+}  // namespace feeler::env
