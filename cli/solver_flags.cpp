@@ -67,4 +67,21 @@ env::Opening ParseOpening(const std::string& text) {
   return Choose("--opening", text, std::array{env::Opening::kClosed, env::Opening::kOpen});
 }
 
+planner::ExperienceKind ParseExperience(const std::string& text) {
+  using planner::ExperienceKind;
+  return Choose("--experience", text,
+                std::array{ExperienceKind::kRollout, ExperienceKind::kNaive, ExperienceKind::kNone});
+}
+
+GoalKind ParseGoal(const std::string& text) {
+  return Choose("--goal", text, std::array{GoalKind::kSingleton, GoalKind::kInsertable});
+}
+
+Parallelism ParseJobs(int jobs) {
+  if (jobs < 1 || jobs > 1024) {
+    throw InputError("--jobs", std::to_string(jobs) + " threads", "give a number from 1 to 1024");
+  }
+  return Parallelism(jobs);
+}
+
 }  // namespace feeler::cli

@@ -3,8 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "core/parallelism.h"
 #include "env/contact_map_builder.h"
 #include "planner/solver/options.h"
+#include "planner/solver/solve.h"
 
 namespace feeler::cli {
 
@@ -26,5 +28,11 @@ struct SolverFlags {
 
 /// --opening closed|open.
 env::Opening ParseOpening(const std::string& text);
+/// --experience rollout|naive|none.
+planner::ExperienceKind ParseExperience(const std::string& text);
+/// --goal singleton|insertable.
+GoalKind ParseGoal(const std::string& text);
+/// --jobs, 1..1024.
+Parallelism ParseJobs(int jobs);
 
 }  // namespace feeler::cli

@@ -1,0 +1,206 @@
+// feeler db: look into a policy database.
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/db_summary.h"
+#include "cli/policy_output.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "planner/solver/evaluate.h"
+#include "workflow/database_builder.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string file;
+  std::string extents;
+  std::string task;
+  std::string out;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  bool json = false;
+};
+
+nlohmann::json ProblemJson(const policies::StoredProblem& problem) {
+  return {{"extents", planner::ToString(problem.extents)},
+          {"hypotheses", problem.extents.Count()},
+          {"status", problem.status},
+          {"solver", problem.solver},
+          {"epsilon", problem.epsilon},
+          {"expected_cost", problem.expected_cost},
+          {"lower_bound", problem.lower_bound},
+          {"ratio", problem.Ratio()},
+          {"expansions", problem.expansions},
+          {"seed", problem.seed},
+          {"version", problem.version},
+          {"cpu_s", problem.cpu_s},
+          {"wall_s", problem.wall_s}};
+}
+
+workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags& flags) {
+  const policies::DatabaseIdentity& identity = database.identity();
+  ProgressBar bar("contact map");
+  workflow::PlanningSetupOptions options;
+  options.opening = ParseOpening(identity.opening);
+  options.goal = identity.goal == ToString(GoalKind::kSingleton) ? GoalKind::kSingleton : GoalKind::kInsertable;
+  options.jobs = ParseJobs(flags.jobs);
+  options.progress = bar.Callback();
+  workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task.empty() ? identity.task : flags.task, options);
+  database.RequireFingerprint(setup.task().name, setup.fingerprint);
+  return setup;
+}
+
+policies::StoredProblem Find(policies::Database& database, const Flags& flags) {
+  auto stored = database.Get(planner::ParseExtents(flags.extents));
+  if (!stored) {
+    throw InputError(flags.file, "holds no problem " + flags.extents, "see feeler db list " + flags.file);
+  }
+  return *stored;
+}
+
+void Info(const Flags& flags) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const policies::DatabaseIdentity& identity = database.identity();
+  if (flags.json) {
+    nlohmann::json json = InfoJson(database.Info());
+    json["task"] = identity.task;
+    json["fingerprint"] = identity.fingerprint;
+    json["opening"] = identity.opening;
+    json["goal"] = identity.goal;
+    json["settings"] = nlohmann::json::parse(identity.settings);
+    json["created_by"] = identity.created_by;
+    json["content_digest"] = database.ContentDigest();
+    PrintJson(json);
+    return;
+  }
+  fmt::print("task                {} ({})\n", identity.task, identity.fingerprint);
+  fmt::print("opening, goal       {}, {}\n", identity.opening, identity.goal);
+  fmt::print("settings            {}\n", identity.settings);
+  PrintInfo(database.Info());
+  fmt::print("content             {}\n", database.ContentDigest());
+}
+
+void List(const Flags& flags) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const auto problems = database.List();
+  if (flags.json) {
+    nlohmann::json json = nlohmann::json::array();
+    for (const auto& problem : problems) json.push_back(ProblemJson(problem));
+    PrintJson(json);
+    return;
+  }
+  fmt::print("{:<10} {:>10} {:<16} {:>13} {:>11} {:>7} {:>10} {:>9}\n", "extents", "hypotheses", "status",
+             "expected cost", "lower bound", "ratio", "expansions", "CPU s");
+  for (const auto& p : problems) {
+    fmt::print("{:<10} {:>10} {:<16} {:>13.3f} {:>11.3f} {:>7.4f} {:>10} {:>9.4f}\n", planner::ToString(p.extents),
+               p.extents.Count(), p.status, p.expected_cost, p.lower_bound, p.Ratio(), p.expansions, p.cpu_s);
+  }
+}
+
+void Show(const Flags& flags) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const policies::StoredProblem stored = Find(database, flags);
+  nlohmann::json json = ProblemJson(stored);
+  if (stored.policy) {
+    const workflow::PlanningSetup setup = SetupFor(database, flags);
+    const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
+    const planner::PolicyEvaluation evaluation = planner::Evaluate(problem, *stored.policy);
+    json["policy_nodes"] = stored.policy->nodes.size();
+    json["worst_cost"] = evaluation.worst_cost;
+    json["expected_moves"] = evaluation.expected_moves;
+    json["expected_contacts"] = evaluation.expected_contacts;
+  }
+  if (flags.json) {
+    PrintJson(json);
+    return;
+  }
+  for (const auto& [key, value] : json.items()) {
+    fmt::print("{:<18} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
+void Verify(const Flags& flags, Session& session) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const workflow::PlanningSetup setup = SetupFor(database, flags);
+  ProgressBar bar("replaying");
+  const workflow::DatabaseVerification result =
+      workflow::VerifyDatabase(setup, database, ParseJobs(flags.jobs), bar.Callback(), session.cancellation);
+  bar.Finish();
+  const bool cancelled = session.cancellation->cancelled();
+  if (flags.json) {
+    PrintJson({{"problems", result.problems},
+               {"policies", result.policies},
+               {"hypotheses", result.hypotheses},
+               {"largest_cost_error", result.largest_cost_error},
+               {"faults", result.faults},
+               {"first_fault", result.first_fault},
+               {"verified", result.faults == 0 && !cancelled}});
+  } else {
+    fmt::print("{} of {} problems hold a policy; {} hypotheses replayed, largest cost error {:.2g}: {}\n",
+               result.policies, result.problems, result.hypotheses, result.largest_cost_error,
+               cancelled            ? "interrupted"
+               : result.faults == 0 ? "every policy localizes every hypothesis at the stored cost"
+                                    : fmt::format("{} faults, first: {}", result.faults, result.first_fault));
+  }
+  if (result.faults > 0 || cancelled) session.exit_code = 1;
+}
+
+void Export(const Flags& flags) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const policies::StoredProblem stored = Find(database, flags);
+  if (!stored.policy) throw NegativeResult(flags.file, flags.extents + " holds no complete policy");
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  const workflow::PlanningSetup setup = SetupFor(database, flags);
+  const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
+  WritePolicy(problem, *stored.policy, flags.out);
+}
+
+}  // namespace
+
+void AddDbCommand(CLI::App& app, Session& session) {
+  CLI::App* db = app.add_subcommand("db", "Look into a policy database");
+  db->require_subcommand(1);
+  const auto add = [db](const std::string& name, const std::string& help) {
+    auto flags = std::make_shared<Flags>();
+    CLI::App* command = db->add_subcommand(name, help);
+    command->add_option("file", flags->file, "database file")->required();
+    command->add_flag("--json", flags->json, "print JSON");
+    return std::pair(command, flags);
+  };
+  const auto add_task = [](CLI::App* command, const std::shared_ptr<Flags>& flags) {
+    command->add_option("--task", flags->task, "task file (default: the task the database names)");
+    command->add_option("--jobs", flags->jobs, "threads")->capture_default_str();
+  };
+  {
+    auto [command, flags] = add("info", "What it was made for; how many policies, how good, how large");
+    command->callback([flags = flags] { Info(*flags); });
+  }
+  {
+    auto [command, flags] = add("list", "A line a problem");
+    command->callback([flags = flags] { List(*flags); });
+  }
+  {
+    auto [command, flags] = add("show", "One problem and its policy's figures");
+    command->add_option("--extents", flags->extents, "e.g. 7x7x5")->required();
+    add_task(command, flags);
+    command->callback([flags = flags] { Show(*flags); });
+  }
+  {
+    auto [command, flags] = add("verify", "Replay every policy under every hypothesis against the contact map");
+    add_task(command, flags);
+    command->callback([flags = flags, &session] { Verify(*flags, session); });
+  }
+  {
+    auto [command, flags] = add("export", "One policy as JSON (docs/file-formats.md)");
+    command->add_option("--extents", flags->extents, "e.g. 7x7x5")->required();
+    command->add_option("--out", flags->out, "file to write (default: standard output)");
+    add_task(command, flags);
+    command->callback([flags = flags] { Export(*flags); });
+  }
+}
+
+}  // namespace feeler::cli

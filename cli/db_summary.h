@@ -1,0 +1,15 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "policies/storage/database.h"
+
+namespace feeler::cli {
+
+/// Keys: problems, solved, ratio_mean, ratio_max, expected_cost_mean, cpu_s, wall_s, bytes, policy_nodes, statuses,
+/// ratios.
+nlohmann::json InfoJson(const policies::DatabaseInfo& info);
+/// The same for people, with the distribution of certified ratios, on stdout.
+void PrintInfo(const policies::DatabaseInfo& info);
+
+}  // namespace feeler::cli

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "planner/belief/problem.h"
+#include "planner/solver/policy.h"
+
+namespace feeler::cli {
+
+/// Writes the policy file of a problem (docs/file-formats.md) to `path`, or to stdout if it is empty.
+void WritePolicy(const planner::Problem& problem, const planner::Policy& policy, const std::string& path);
+
+}  // namespace feeler::cli

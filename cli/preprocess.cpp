@@ -1,0 +1,88 @@
+// feeler preprocess: the policy database of a task.
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/db_summary.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "workflow/database_builder.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string task;
+  std::string out;
+  std::string family;
+  std::string opening = "closed";
+  std::string order = "uncertainty";
+  std::string experience = "rollout";
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  bool json = false;
+  SolverFlags solver;
+};
+
+void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  planner::PreprocessOptions options;
+  options.solver = flags.solver.Options(command);
+  options.seed = flags.solver.seed;
+  options.jobs = ParseJobs(flags.jobs);
+  options.cancellation = session.cancellation;
+  if (flags.order == "random") {
+    options.order = planner::ProblemOrder::kRandom;
+  } else if (flags.order != "uncertainty") {
+    throw InputError("--order", "unknown value \"" + flags.order + "\"", "choose one of uncertainty, random");
+  }
+  options.experience = ParseExperience(flags.experience);
+  RequireWritable("--out", flags.out);
+
+  ProgressBar map_bar("contact map");
+  workflow::PlanningSetupOptions setup_options;
+  setup_options.opening = ParseOpening(flags.opening);
+  setup_options.jobs = options.jobs;
+  setup_options.progress = map_bar.Callback();
+  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
+  map_bar.Finish();
+  const planner::ProblemFamily family =
+      flags.family.empty() ? planner::FamilyOf(setup.task()) : planner::ParseProblemFamily(flags.family);
+  workflow::RequireWithinTask(family, setup.task());
+
+  ProgressBar bar("problems");
+  options.progress = bar.Callback();
+  const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out);
+  bar.Finish();
+
+  const planner::PreprocessSummary& summary = build.summary;
+  fmt::print(stderr, "{} problems: {} solved now, {} already there, {} failed; {:.1f} s wall, {:.1f} s CPU{}\n",
+             summary.problems, summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
+             summary.cancelled ? "; interrupted, run the same command again to go on" : "");
+  if (flags.json) {
+    PrintJson(InfoJson(build.info));
+  } else {
+    PrintInfo(build.info);
+  }
+  if (summary.cancelled || summary.failed > 0) session.exit_code = 1;
+}
+
+}  // namespace
+
+void AddPreprocessCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("preprocess", "Build (or continue) the policy database of a task");
+  command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
+  command->add_option("--out", flags->out, "database file; an existing one is continued")->required();
+  command->add_option("--family", flags->family, "problems, e.g. 2..15x2..15x2..15 (default: the task's ranges)");
+  command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
+  command->add_option("--order", flags->order, "uncertainty or random (e-rtdp-bel)")->capture_default_str();
+  command->add_option("--experience", flags->experience, "rollout, naive or none (e-rtdp-bel)")->capture_default_str();
+  command->add_option("--jobs", flags->jobs, "threads; the content does not depend on it")->capture_default_str();
+  command->add_flag("--json", flags->json, "print the summary as JSON");
+  flags->solver.AddTo(*command);
+  command->callback([command, flags, &session] { Run(*command, *flags, session); });
+}
+
+}  // namespace feeler::cli

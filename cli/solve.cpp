@@ -1,0 +1,141 @@
+// feeler solve: one problem, of a task or from a lattice file.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/policy_output.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "planner/belief/lattice_problem.h"
+#include "planner/preprocess/problem_family.h"
+#include "policies/formats/lattice_problem_file.h"
+#include "workflow/database_builder.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string task;
+  std::string extents;
+  std::string problem;
+  std::string opening = "closed";
+  std::string goal;
+  std::string out;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  bool json = false;
+  SolverFlags solver;
+};
+
+planner::Problem LoadProblem(const Flags& flags) {
+  if (flags.task.empty() == flags.problem.empty()) {
+    throw InputError("solve", "give either --task with --extents, or --problem", "see feeler solve --help");
+  }
+  if (!flags.problem.empty()) {
+    if (!flags.extents.empty()) {
+      throw InputError("--extents", "goes with --task, not with --problem", "leave it out");
+    }
+    planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
+    if (!flags.goal.empty()) data.goal = ParseGoal(flags.goal);
+    return planner::MakeLatticeProblem(data);
+  }
+  if (flags.extents.empty()) throw InputError("--extents", "missing", "give the extents, e.g. --extents 7x7x5");
+  ProgressBar bar("contact map");
+  workflow::PlanningSetupOptions options;
+  options.opening = ParseOpening(flags.opening);
+  if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
+  options.jobs = ParseJobs(flags.jobs);
+  options.progress = bar.Callback();
+  const planner::Extents extents = planner::ParseExtents(flags.extents);
+  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
+  workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
+  return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
+}
+
+/// JSON has no infinity: null.
+nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+
+void PrintResult(const planner::SolverResult& result) {
+  fmt::print("status         {}\n", planner::ToString(result.status));
+  if (result.complete()) {
+    fmt::print("expected cost  {:.6g}\nlower bound    {:.6g}\nratio          {:.4f}\npolicy nodes   {}\n",
+               result.expected_cost, result.lower_bound, result.Ratio(), result.policy->nodes.size());
+  } else {
+    fmt::print("lower bound    {:.6g}\n", result.lower_bound);
+  }
+  fmt::print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s, result.wall_s);
+}
+
+void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  planner::SolverOptions options = flags.solver.Options(command);
+  options.cancellation = session.cancellation;
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  const planner::Problem problem = LoadProblem(flags);
+
+  bool header = false;
+  options.on_bounds = [&header](const planner::BoundsRow& row) {
+    if (!header) {
+      fmt::print(stderr, "{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper",
+                 "ratio");
+      header = true;
+    }
+    fmt::print(stderr, "{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
+               row.lower_bound, row.upper_bound, row.Ratio());
+  };
+  const planner::SolverResult result = planner::Solve(problem, options);
+
+  if (result.status == planner::SolverStatus::kUnlocalizable) {
+    fmt::print(stderr, "feeler: {} pairs of hypotheses cannot be told apart by any probe:\n",
+               result.indistinguishable.size());
+    for (const auto& [i, j] : result.indistinguishable) {
+      const auto& a = problem.hypotheses[static_cast<std::size_t>(i)].offset;
+      const auto& b = problem.hypotheses[static_cast<std::size_t>(j)].offset;
+      fmt::print(stderr, "  {} [{}, {}, {}] and {} [{}, {}, {}]\n", i, a.x(), a.y(), a.z(), j, b.x(), b.y(), b.z());
+    }
+  }
+  if (result.complete() && !flags.out.empty()) WritePolicy(problem, *result.policy, flags.out);
+  if (flags.json) {
+    nlohmann::json pairs = nlohmann::json::array();
+    for (const auto& [i, j] : result.indistinguishable) pairs.push_back({i, j});
+    PrintJson({{"problem", problem.name},
+               {"status", planner::ToString(result.status)},
+               {"solver", planner::ToString(options.solver)},
+               {"setting", flags.solver.setting},
+               {"heuristic", planner::ToString(options.heuristic)},
+               {"hypotheses", problem.hypotheses.size()},
+               {"expected_cost", Number(result.expected_cost)},
+               {"lower_bound", Number(result.lower_bound)},
+               {"ratio", Number(result.Ratio())},
+               {"trials", result.trials},
+               {"expansions", result.expansions},
+               {"cpu_s", result.cpu_s},
+               {"wall_s", result.wall_s},
+               {"policy_nodes", result.complete() ? result.policy->nodes.size() : 0},
+               {"indistinguishable", pairs}});
+  } else {
+    PrintResult(result);
+  }
+  if (!result.complete()) session.exit_code = 1;
+}
+
+}  // namespace
+
+void AddSolveCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("solve", "Solve one problem; prints the bounds as they close");
+  command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");
+  command->add_option("--extents", flags->extents, "hypotheses per axis, e.g. 7x7x5 (with --task)");
+  command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
+  command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
+  command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
+  command->add_option("--out", flags->out, "policy file to write");
+  command->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
+  command->add_flag("--json", flags->json, "print the result as JSON");
+  flags->solver.AddTo(*command);
+  command->callback([command, flags, &session] { Run(*command, *flags, session); });
+}
+
+}  // namespace feeler::cli
