@@ -62,5 +62,7 @@ add_library(tinyxml2 ALIAS PkgConfig::TINYXML2)
 find_package(ompl REQUIRED)
 add_library(feeler_ompl INTERFACE)
 target_include_directories(feeler_ompl SYSTEM INTERFACE ${OMPL_INCLUDE_DIRS})
-target_link_libraries(feeler_ompl INTERFACE ${OMPL_LIBRARIES})
+# Debian's omplConfig also lists Boost libraries and ODE, which its package does not bring and we do not use.
+list(GET OMPL_LIBRARIES 0 FEELER_OMPL_LIBRARY)
+target_link_libraries(feeler_ompl INTERFACE ${FEELER_OMPL_LIBRARY})
 add_library(feeler::ompl ALIAS feeler_ompl)
