@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/pose.h"
+#include "execution/execution_record.h"
+#include "planner/preprocess/problem_family.h"
+
+namespace feeler::workflow {
+
+/// Final estimate against the truth.
+struct PoseError {
+  double lateral_m = 0.0;   ///< across the insertion axis
+  double vertical_m = 0.0;  ///< along it
+  double angle_rad = 0.0;
+};
+
+/// One seeded attempt, scored. Everything but `timing` is a pure function of task, policy, settings, seed and episode.
+struct EpisodeRecord {
+  std::string task;
+  std::string policy;
+  std::string noise;
+  std::uint64_t seed = 0;
+  std::uint64_t episode = 0;
+  planner::Extents extents;
+  Pose world_T_true = Pose::Identity();       ///< of the target
+  Pose world_T_estimate0 = Pose::Identity();  ///< where the episode was told the target would be
+  std::optional<PoseError> error;             ///< empty without a final estimate
+  bool localized = false;                     ///< the final estimate lies within the task's tolerance on every axis
+  bool inserted = false;                      ///< as the environment judges it
+  std::string reason;                         ///< "inserted", or why not
+  double peak_force_n = 0.0;                  ///< exact contact force on tool and gripper
+  execution::ExecutionRecord execution;       ///< what the executor did and believes
+
+  struct Timing {
+    double plan_cpu_s = 0.0;      ///< look-up and decisions of the policy
+    double transfer_cpu_s = 0.0;  ///< planning of free-space motions
+    double cpu_s = 0.0;           ///< the whole episode, physics included
+  } timing;
+};
+
+}  // namespace feeler::workflow
