@@ -1,0 +1,37 @@
+#include "env/control/impedance.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace feeler::env {
+
+JointVector CartesianImpedance(const World& world, const JointVector& q_rad, const JointVector& qd_rad_s,
+                               const PosePoint& reference, const ImpedanceGains& gains) {
+  const Pose tool = ToolForwardKinematics(world.scene(), q_rad);
+  const Matrix6 jacobian = ToolJacobian(world.scene(), q_rad);
+  const Eigen::Matrix3d to_tool = tool.linear().transpose();
+
+  Matrix6 tool_jacobian;  // the same, in tool axes
+  tool_jacobian.topRows<3>() = to_tool * jacobian.topRows<3>();
+  tool_jacobian.bottomRows<3>() = to_tool * jacobian.bottomRows<3>();
+  // Mobility of the tool axes; its inverse diagonal is the inertia felt along one axis while the others are free.
+  const Matrix6 mobility = tool_jacobian * world.Inertia().llt().solve(tool_jacobian.transpose());
+
+  const Vector6 error = PoseError(tool, reference.pose);
+  const Vector6 twist_error = reference.twist - jacobian * qd_rad_s;
+  Vector6 local_error, local_twist, stiffness;
+  local_error << to_tool * error.head<3>(), to_tool * error.tail<3>();
+  local_twist << to_tool * twist_error.head<3>(), to_tool * twist_error.tail<3>();
+  stiffness << gains.stiffness_n_m, Eigen::Vector3d::Constant(gains.rotational_stiffness_nm_rad);
+
+  Vector6 wrench;
+  for (int i = 0; i < 6; ++i) {
+    const double damping = 2 * gains.damping_ratio * std::sqrt(stiffness[i] / std::max(mobility(i, i), 1e-6));
+    wrench[i] = stiffness[i] * local_error[i] + damping * local_twist[i];
+  }
+  return tool_jacobian.transpose() * wrench + world.BiasTorque();
+}
+
+}  // namespace feeler::env

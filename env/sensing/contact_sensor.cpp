@@ -1,0 +1,135 @@
+#include "env/sensing/contact_sensor.h"
+
+#include <cmath>
+#include <optional>
+
+namespace feeler::env {
+namespace {
+
+constexpr double kFilter_s = 0.01;
+
+double Gain(double dt_s, double time_constant_s) { return 1.0 - std::exp(-dt_s / time_constant_s); }
+
+std::optional<ContactPair> PairOf(ScenePart a, ScenePart b) {
+  if (a > b) std::swap(a, b);  // kRobot < kTool < kTarget < kEnvironment
+  if (a == ScenePart::kRobot) {
+    switch (b) {
+      case ScenePart::kRobot: return ContactPair::kRobotRobot;
+      case ScenePart::kTool: return ContactPair::kToolRobot;
+      case ScenePart::kTarget: return ContactPair::kRobotTarget;
+      case ScenePart::kEnvironment: return ContactPair::kRobotEnvironment;
+    }
+  }
+  if (a == ScenePart::kTool && b == ScenePart::kTarget) return ContactPair::kToolTarget;
+  if (a == ScenePart::kTool && b == ScenePart::kEnvironment) return ContactPair::kToolEnvironment;
+  return std::nullopt;
+}
+
+Eigen::Vector3d Quantise(const Eigen::Vector3d& v, double quantum) {
+  return quantum > 0 ? Eigen::Vector3d((v / quantum).array().round() * quantum) : v;
+}
+
+}  // namespace
+
+std::string_view ToString(ContactPair pair) {
+  switch (pair) {
+    case ContactPair::kToolTarget: return "tool-target";
+    case ContactPair::kToolEnvironment: return "tool-environment";
+    case ContactPair::kToolRobot: return "tool-robot";
+    case ContactPair::kRobotTarget: return "robot-target";
+    case ContactPair::kRobotEnvironment: return "robot-environment";
+    case ContactPair::kRobotRobot: return "robot-robot";
+  }
+  return "";
+}
+
+const Wrench& LowPass::Update(const Wrench& sample, double dt_s) {
+  const double gain = Gain(dt_s, time_constant_s_);
+  value_.force_n += gain * (sample.force_n - value_.force_n);
+  value_.torque_nm += gain * (sample.torque_nm - value_.torque_nm);
+  return value_;
+}
+
+void LowPass::Shift(const Wrench& offset) {
+  value_.force_n -= offset.force_n;
+  value_.torque_nm -= offset.torque_nm;
+}
+
+ContactSensor::ContactSensor(const Scene& scene, const NoiseOptions& noise, RandomStream random)
+    : noise_(noise), random_(random), filter_(kFilter_s) {
+  const mjModel& model = *scene.model;
+  geom_.resize(static_cast<std::size_t>(model.ngeom));
+  for (int g = 0; g < model.ngeom; ++g) {
+    Side& side = geom_[static_cast<std::size_t>(g)];
+    side.part = scene.geom_part[static_cast<std::size_t>(g)];
+    for (int body = model.geom_bodyid[g]; body > 0; body = model.body_parentid[body]) {
+      side.beyond_sensor |= body == scene.flange_body || body == scene.tool_body;
+    }
+  }
+  for (int i = 0; i < 3; ++i) bias_.force_n[i] = noise.force_bias_n > 0 ? noise.force_bias_n * random_.Normal() : 0.0;
+  const auto delay = static_cast<std::size_t>(std::lround(noise.force_delay_s / model.opt.timestep));
+  delayed_.resize(delay);
+}
+
+Wrench ContactSensor::Measure(const Wrench& exact) {
+  Wrench w = exact;
+  if (!delayed_.empty()) {
+    std::swap(w, delayed_[next_]);
+    next_ = (next_ + 1) % delayed_.size();
+  }
+  w.force_n += bias_.force_n;
+  for (int i = 0; i < 3 && noise_.force_noise_n > 0; ++i) w.force_n[i] += noise_.force_noise_n * random_.Normal();
+  for (int i = 0; i < 3 && noise_.torque_noise_nm > 0; ++i) w.torque_nm[i] += noise_.torque_noise_nm * random_.Normal();
+  w.force_n = Quantise(w.force_n, noise_.force_quantum_n) - offset_.force_n;
+  w.torque_nm -= offset_.torque_nm;
+  return w;
+}
+
+void ContactSensor::Update(const World& world) {
+  exact_ = {};
+  std::array<Eigen::Vector3d, kContactPairCount> pair;
+  pair.fill(Eigen::Vector3d::Zero());
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d origin = world.ToolPoseAtContact().translation();
+  for (const ContactForce& c : world.contacts()) {
+    const Side& side1 = geom_[static_cast<std::size_t>(c.geom1)];
+    const Side& side2 = geom_[static_cast<std::size_t>(c.geom2)];
+    if (const auto p = PairOf(side1.part, side2.part)) {
+      // Of two parts alike the sign is arbitrary; the sum is then of magnitudes along one axis at best, good enough
+      // for a flag.
+      const double sign = side2.part <= side1.part ? 1.0 : -1.0;
+      pair[static_cast<std::size_t>(*p)] += sign * c.force_n;
+    }
+    if (side1.beyond_sensor != side2.beyond_sensor) {
+      const double sign = side2.beyond_sensor ? 1.0 : -1.0;
+      exact_.force_n += sign * c.force_n;
+      exact_.torque_nm += sign * (c.torque_nm + (c.point_m - origin).cross(c.force_n));
+    }
+    const bool arm1 = side1.part == ScenePart::kRobot && !side1.beyond_sensor;
+    const bool arm2 = side2.part == ScenePart::kRobot && !side2.beyond_sensor;
+    if (arm1 || arm2) arm += (arm2 ? 1.0 : -1.0) * c.force_n;
+  }
+  arm_force_ = arm.norm();
+  const double gain = Gain(world.timestep_s(), kFilter_s);
+  for (std::size_t i = 0; i < kContactPairCount; ++i) {
+    pair_force_[i] = pair[i].norm();
+    pair_filtered_[i] += gain * (pair_force_[i] - pair_filtered_[i]);
+    pair_flag_[i].Update(pair_filtered_[i]);
+  }
+  raw_ = Measure(exact_);
+  filter_.Update(raw_, world.timestep_s());
+}
+
+void ContactSensor::Shift(const Wrench& offset) {
+  offset_.force_n += offset.force_n;
+  offset_.torque_nm += offset.torque_nm;
+  raw_.force_n -= offset.force_n;
+  raw_.torque_nm -= offset.torque_nm;
+  filter_.Shift(offset);
+}
+
+bool ContactSensor::ToolFlag() const {
+  return PairFlag(ContactPair::kToolTarget) || PairFlag(ContactPair::kToolEnvironment);
+}
+
+}  // namespace feeler::env

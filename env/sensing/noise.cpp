@@ -1,0 +1,44 @@
+#include "env/sensing/noise.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "env/scene.h"
+
+namespace feeler::env {
+
+void NoiseOptions::Validate() const {
+  for (const auto& [field, value] :
+       {std::pair{"joint_friction_nm", joint_friction_nm.minCoeff()}, std::pair{"force_noise_n", force_noise_n},
+        std::pair{"torque_noise_nm", torque_noise_nm}, std::pair{"force_bias_n", force_bias_n},
+        std::pair{"force_delay_s", force_delay_s}, std::pair{"force_quantum_n", force_quantum_n},
+        std::pair{"encoder_noise_rad", encoder_noise_rad}, std::pair{"contact_threshold_n", contact_threshold_n}}) {
+    if (!(value >= 0) || !std::isfinite(value)) {
+      throw InputError("noise " + name, fmt::format("{} is {}", field, value), "give a finite number, zero or more");
+    }
+  }
+  if (!joint_friction_nm.allFinite()) throw InputError("noise " + name, "joint_friction_nm is not finite");
+  if (force_delay_s > 0.1) throw InputError("noise " + name, "force_delay_s is above 0.1 s", "give at most 0.1");
+}
+
+NoiseOptions NoisePreset(std::string_view name) {
+  NoiseOptions noise;
+  noise.name = name;
+  if (name == "ideal") return noise;
+  if (name == "friction") {
+    noise.joint_friction_nm = Eigen::Map<const JointVector>(kRealisticJointFriction.data());
+    noise.force_noise_n = 1.0;
+    noise.torque_noise_nm = 0.02;
+    noise.contact_threshold_n = 10.0;
+    return noise;
+  }
+  throw InputError("noise", fmt::format("no preset is named '{}'", name),
+                   fmt::format("one of: {}", fmt::join(NoisePresetNames(), ", ")));
+}
+
+std::vector<std::string> NoisePresetNames() { return {"ideal", "friction"}; }
+
+}  // namespace feeler::env
