@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/parallelism.h"
+#include "core/progress.h"
+#include "env/insertion_env.h"
+#include "execution/executor.h"
+#include "planner/preprocess/problem_family.h"
+#include "workflow/episode_draw.h"
+#include "workflow/episode_record.h"
+#include "workflow/planning_setup.h"
+#include "workflow/policy_registry.h"
+
+namespace feeler::workflow {
+
+struct EpisodeOptions {
+  std::uint64_t seed = 1;
+  /// The problems an episode may meet, drawn uniformly; one problem: always that one.
+  planner::ProblemFamily family;
+  std::string noise = "ideal";
+  /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
+  bool withhold_true_pose = false;
+};
+
+/// One attempt: reset, hypotheses, transfer to the start pose, localize by touch, insert, score.
+/// One object per thread; the scene is shared.
+class EpisodeRunner {
+ public:
+  EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
+                PolicyFactory policy_factory, EpisodeOptions options);
+
+  EpisodeRecord Run(std::uint64_t episode);
+  /// The world of the runner, e.g. to watch it.
+  env::InsertionEnv& environment() { return *environment_; }
+
+ private:
+  std::shared_ptr<const PlanningSetup> setup_;
+  PolicyFactory policy_factory_;
+  EpisodeOptions options_;
+  std::unique_ptr<env::InsertionEnv> environment_;
+};
+
+/// Runs episodes 0..count-1 on several threads; hands the records to `on_record` in order of episode. Stops early,
+/// after the records finished so far, when cancelled. Returns how many were handed over.
+std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
+                         const std::function<void(const EpisodeRecord&)>& on_record, const ProgressCallback& progress,
+                         const CancellationToken* cancellation);
+
+}  // namespace feeler::workflow

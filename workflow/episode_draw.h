@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/pose.h"
+#include "core/task.h"
+#include "planner/preprocess/problem_family.h"
+
+namespace feeler::workflow {
+
+/// The draws of one episode: which problem is met, and where the target truly is.
+struct EpisodeDraw {
+  planner::Extents extents;
+  Pose world_T_estimate = Pose::Identity();  ///< what the episode is told: the nominal pose of the task
+  Pose world_T_true = Pose::Identity();
+};
+
+/// Episode k of a seed, the same alone or among thousands: a problem uniform in the family, and a true offset uniform
+/// in the lattice span plus half a cell each side along every uncertain axis. Throws InputError for an empty family.
+EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
+                        std::uint64_t episode);
+
+}  // namespace feeler::workflow
