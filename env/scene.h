@@ -12,6 +12,7 @@
 #include "core/task.h"
 #include "env/kinematics/ur10e.h"
 #include "env/mujoco_handles.h"
+#include "env/task_file.h"
 
 namespace feeler::env {
 
@@ -73,10 +74,14 @@ struct Scene {
   Pose flange_T_tool = Pose::Identity();
 };
 
-/// Assembles and compiles the scene of a task. `task_xml` is the text of the task's MJCF file with bodies `tool` and
-/// `target`; relative mesh and texture paths in it are taken from the folder of task.file. The robot comes from
-/// models/robots/ur10e.urdf under `models_folder`.
-/// Throws InputError when the task lacks one of the bodies, defines a name that the robot uses, or does not compile.
+/// Assembles and compiles the scene of a loaded task. The robot comes from robots/ur10e.urdf under ModelsFolder(); a
+/// gripper between flange and tool is fitted to the tool. Global settings of the task file (<option>, <size>,
+/// <visual>) give way to those of the scene where both speak.
+/// Throws InputError when tool or target have joints, a name is used by task and robot, or the whole does not compile.
+Scene BuildScene(const TaskModel& task, const SceneOptions& options = {});
+
+/// The same with all inputs spelled out. `task_xml` is MJCF text with bodies `tool` and `target` directly in the
+/// world, includes in place and file names absolute.
 Scene BuildScene(const Task& task, const std::string& task_xml, const std::string& models_folder,
                  const SceneOptions& options = {});
 
