@@ -31,7 +31,7 @@ function(feeler_room name)
 endfunction()
 
 # feeler_tests(ROOM): executable ROOM_tests from tests/ROOM/*.cpp, each test registered with ctest.
-function(feeler_tests room)
+function(feeler_tests room)  # the tests of `cli` run the binary
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/${room}/*.cpp)
   if(NOT sources)
     return()
@@ -39,6 +39,9 @@ function(feeler_tests room)
   add_executable(${room}_tests ${sources})
   target_link_libraries(${room}_tests PRIVATE feeler::${room} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${CMAKE_SOURCE_DIR}" FEELER_BINARY="${CMAKE_BINARY_DIR}/feeler")
+  if(room STREQUAL cli)
+    add_dependencies(cli_tests feeler)
+  endif()
   gtest_discover_tests(${room}_tests DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600 LABELS ${room})
 endfunction()
 

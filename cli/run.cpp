@@ -1,0 +1,167 @@
+// feeler run: seeded episodes in simulation.
+#include <fmt/format.h>
+
+#include <fstream>
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "env/scene.h"
+#include "env/sensing/noise.h"
+#include "evaluation/episode_json.h"
+#include "evaluation/run_summary.h"
+#include "workflow/episode.h"
+#include "workflow/episode_video.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string task;
+  std::string db;
+  std::string policy = "database";
+  std::string extents;
+  std::string noise = "ideal";
+  std::string out;
+  std::string video;
+  std::int64_t episodes = 1;
+  std::int64_t seed = 1;
+  std::int64_t video_episode = 0;
+  int jobs = 1;
+  bool no_ladder = false;
+  bool withhold_true_pose = false;
+  bool json = false;
+};
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string joined;
+  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
+  return joined;
+}
+
+void RequireSane(const Flags& flags) {
+  if (flags.episodes < 1) {
+    throw InputError("--episodes", std::to_string(flags.episodes) + " episodes", "give a number of at least 1");
+  }
+  if (flags.seed < 0) throw InputError("--seed", "negative", "give a number of at least 0");
+  if (flags.video_episode < 0) throw InputError("--video-episode", "negative", "give a number of at least 0");
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  if (!flags.video.empty()) RequireWritable("--video", flags.video);
+}
+
+/// The problems that episodes draw from: the one given, else all that the database has a policy for, else the task's.
+planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies::Database* database) {
+  if (!flags.extents.empty()) {
+    planner::ProblemFamily family{{planner::ParseExtents(flags.extents)}, flags.extents};
+    workflow::RequireWithinTask(family, task);
+    return family;
+  }
+  if (database == nullptr) return planner::FamilyOf(task);
+  planner::ProblemFamily family;
+  family.spec = database->path();
+  for (const policies::StoredProblem& problem : database->List()) {
+    if (std::isfinite(problem.expected_cost)) family.problems.push_back(problem.extents);
+  }
+  if (family.problems.empty()) {
+    throw InputError(database->path(), "holds no policy", "fill it with feeler preprocess");
+  }
+  return family;
+}
+
+void Run(const Flags& flags, Session& session) {
+  RequireSane(flags);
+  const Parallelism jobs = ParseJobs(flags.jobs);
+  env::NoisePreset(flags.noise);  // an unknown name fails before the contact map is built
+
+  std::shared_ptr<policies::Database> database;
+  if (!flags.db.empty()) {
+    database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(flags.db));
+  }
+  const workflow::PolicyFactory policy_factory = workflow::MakePolicyFactory(flags.policy, database);
+
+  ProgressBar map_bar("contact map");
+  workflow::PlanningSetupOptions setup_options;
+  if (database) setup_options.opening = ParseOpening(database->identity().opening);
+  setup_options.jobs = jobs;
+  setup_options.progress = map_bar.Callback();
+  const auto setup =
+      std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
+  map_bar.Finish();
+  if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
+
+  workflow::EpisodeOptions options;
+  options.seed = static_cast<std::uint64_t>(flags.seed);
+  options.family = FamilyFor(flags, setup->task(), database.get());
+  options.noise = flags.noise;
+  options.withhold_true_pose = flags.withhold_true_pose;
+  const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
+  const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };
+
+  std::ofstream out;
+  if (!flags.out.empty()) {
+    out.open(flags.out);
+    if (!out) throw InputError("--out", "cannot write " + flags.out, "choose another file");
+  }
+  std::vector<evaluation::EpisodeSummaryRow> rows;
+  const auto on_record = [&](const workflow::EpisodeRecord& record) {
+    rows.push_back(evaluation::SummaryRow(record));
+    if (out.is_open()) out << evaluation::ToJson(record).dump() << "\n" << std::flush;
+  };
+  ProgressBar bar("episodes");
+  workflow::RunEpisodes(flags.episodes, jobs, make_runner, on_record, bar.Callback(), session.cancellation);
+  bar.Finish();
+  if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
+
+  if (!flags.video.empty() && !session.cancellation->cancelled()) {
+    ProgressBar video_bar("video frames");
+    workflow::EpisodeRunner runner = make_runner();
+    workflow::RecordEpisodeVideo(runner, static_cast<std::uint64_t>(flags.video_episode), flags.video,
+                                 video_bar.Callback());
+  }
+
+  const evaluation::RunSummary summary = evaluation::Summarize(rows);
+  if (flags.json) {
+    nlohmann::json json = evaluation::ToJson(summary);
+    json["task"] = setup->task().name;
+    json["policy"] = flags.policy;
+    json["noise"] = flags.noise;
+    json["seed"] = flags.seed;
+    PrintJson(json);
+  } else {
+    fmt::print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
+               flags.seed, summary.episodes, evaluation::ToText(summary));
+  }
+  if (session.cancellation->cancelled()) {
+    fmt::print(stderr, "interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);
+    session.exit_code = 1;
+  }
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("run", "Episodes in simulation: transfer, localize by touch, insert, score");
+  command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
+  command->add_option("--db", flags->db, "policy database of the task (feeler preprocess)");
+  command->add_option("--policy", flags->policy, Joined(workflow::PolicyNames()))->capture_default_str();
+  command->add_option("--episodes", flags->episodes, "how many")->capture_default_str();
+  command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
+  command->add_option("--extents", flags->extents,
+                      "always this problem, e.g. 7x7x7 (default: drawn from the database)");
+  command->add_option("--noise", flags->noise, Joined(env::NoisePresetNames()))->capture_default_str();
+  command->add_flag("--no-ladder", flags->no_ladder, "the bare policy, without fallbacks");
+  command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
+                    "leave the true pose out of what the environment tells; the records stay the same");
+  command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();
+  command->add_option("--out", flags->out, "records, one JSON object a line (docs/file-formats.md)");
+  command->add_option("--video", flags->video, "MP4 of one episode");
+  command->add_option("--video-episode", flags->video_episode, "which episode the video shows")->capture_default_str();
+  command->add_flag("--json", flags->json, "print the summary as JSON");
+  command->callback([flags, &session] { Run(*flags, session); });
+}
+
+}  // namespace feeler::cli

@@ -1,0 +1,113 @@
+// Law: bad usage or input ends with exit code 2 and one line `feeler: error: WHERE: WHAT (HOW TO MEND)` that names what
+// was wrong, and leaves nothing half-written.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "tests/cli/run_feeler.h"
+
+namespace feeler::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+void ExpectOneError(const CommandResult& result, const std::string& named) {
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_TRUE(result.out.empty()) << result.out;
+  EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
+}
+
+TEST(BadUsage, UnknownWordsAndValuesAreNamed) {
+  ExpectOneError(RunFeeler({}), "subcommand");
+  ExpectOneError(RunFeeler({"insert"}), "insert");
+  ExpectOneError(RunFeeler({"solve", "--nonsense"}), "nonsense");
+  ExpectOneError(RunFeeler({"solve"}), "--task");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug"}), "--extents");
+  ExpectOneError(RunFeeler({"solve", "--task", "no-such-task", "--extents", "2x2x2"}), "no-such-task");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2"}), "2x2");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "0x2x2"}), "0x2x2");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "-3x2x2"}), "-3x2x2");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x60"}), "2x2x60");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--solver", "magic"}), "magic");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--epsilon", "0.5"}), "epsilon");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--epsilon", "nan"}), "epsilon");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--gap", "0.9"}), "gap");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--time-limit", "0"}), "time");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--expansion-limit", "-1"}), "expansion");
+  ExpectOneError(RunFeeler({"solve", "--problem", "/no/such/file.json"}), "/no/such/file.json");
+}
+
+TEST(BadUsage, PreprocessRefusesBadFamiliesAndPlaces) {
+  const std::string folder = ScratchFolder("preprocess");
+  const std::string db = folder + "/x.db";
+  for (const std::string family : {"2..99x2..3x2..3", "5..2x2x2", "2x2", "axbxc", "0..3x2x2", "-1x2x2", "1e9x1x1"}) {
+    ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", db, "--family", family}), "");
+    EXPECT_FALSE(fs::exists(db)) << family;
+  }
+  ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", "/no/such/folder/x.db"}), "/no/such/folder");
+  ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", folder}), "directory");
+  ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", db, "--jobs", "0"}), "--jobs");
+  ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", db, "--order", "fast"}), "fast");
+  EXPECT_FALSE(fs::exists(db));
+}
+
+TEST(BadUsage, RunRefusesWhatItCannotRun) {
+  ExpectOneError(RunFeeler({"run", "--task", "plug"}), "--db");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "psychic"}), "psychic");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--episodes", "0"}), "--episodes");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--episodes", "-5"}), "--episodes");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--noise", "loud"}), "loud");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--db", "/no/such.db"}), "/no/such.db");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--out", "/no/such/folder/e.jsonl"}),
+                 "/no/such/folder");
+}
+
+/// A database of two small problems, made once.
+const std::string& SmallDatabase() {
+  static const std::string path = [] {
+    const std::string file = ScratchFolder("db") + "/small.db";
+    const CommandResult result =
+        RunFeeler({"preprocess", "--task", "plug", "--out", file, "--family", "2..3x2x2", "--jobs", "2"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return file;
+  }();
+  return path;
+}
+
+TEST(BadDatabase, IsRefusedWhateverIsWrongWithIt) {
+  const std::string good = ReadFile(SmallDatabase());
+  ASSERT_GT(good.size(), 4096U);
+  const std::string folder = ScratchFolder("broken");
+  const auto expect_refused = [&](const std::string& name, const std::string& content) {
+    const std::string file = folder + "/" + name;
+    WriteFile(file, content);
+    ExpectOneError(RunFeeler({"db", "verify", file}), file);
+    ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", file, "--family", "2..3x2x2"}), file);
+    EXPECT_EQ(ReadFile(file), content) << name << " was changed";
+  };
+  expect_refused("truncated.db", good.substr(0, good.size() / 2));
+  expect_refused("text.db", "this is not a database\n");
+  for (const double share : {0.1, 0.35, 0.6, 0.85}) {
+    std::string flipped = good;
+    // A byte of the page's content: the share of the file, moved off the free space that a page may hold.
+    std::size_t position = static_cast<std::size_t>(share * static_cast<double>(good.size()));
+    while (position < good.size() && good[position] == 0) ++position;
+    flipped[position] = static_cast<char>(flipped[position] ^ 0x10);
+    WriteFile(folder + "/flipped.db", flipped);
+    const CommandResult result = RunFeeler({"db", "verify", folder + "/flipped.db"});
+    EXPECT_EQ(result.exit_code, 2) << share << " " << result.out << result.err;
+  }
+}
+
+TEST(BadDatabase, OfAnotherSettingOrTaskIsRefusedAndKept) {
+  const std::string before = ReadFile(SmallDatabase());
+  ExpectOneError(RunFeeler({"preprocess", "--task", "plug", "--out", SmallDatabase(), "--gap", "1.5"}), "small.db");
+  const std::string task = ReadFile(std::string(FEELER_SOURCE_DIR) + "/models/tasks/plug.xml");
+  EXPECT_EQ(ReadFile(SmallDatabase()), before);
+}
+
+}  // namespace
+}  // namespace feeler::cli

@@ -1,0 +1,52 @@
+#include "tests/cli/run_feeler.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+namespace feeler::cli {
+
+std::string ScratchFolder(const std::string& name) {
+  const std::string folder = testing::TempDir() + "/feeler_" + name + "_" + std::to_string(getpid());
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  return folder;
+}
+
+std::string ReadFile(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+void WriteFile(const std::string& path, const std::string& content) {
+  std::ofstream(path, std::ios::binary) << content;
+}
+
+CommandResult RunFeeler(const std::vector<std::string>& arguments) {
+  static int calls = 0;
+  const std::string folder = ScratchFolder("call" + std::to_string(calls++));
+  const pid_t child = fork();
+  if (child == 0) {
+    if (freopen((folder + "/out").c_str(), "w", stdout) == nullptr) _exit(126);
+    if (freopen((folder + "/err").c_str(), "w", stderr) == nullptr) _exit(126);
+    std::vector<char*> argv = {const_cast<char*>(FEELER_BINARY)};
+    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    execv(FEELER_BINARY, argv.data());
+    _exit(127);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  CommandResult result;
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.out = ReadFile(folder + "/out");
+  result.err = ReadFile(folder + "/err");
+  std::filesystem::remove_all(folder);
+  return result;
+}
+
+}  // namespace feeler::cli

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace feeler::cli {
+
+struct CommandResult {
+  int exit_code = -1;
+  std::string out;
+  std::string err;
+};
+
+/// Runs the feeler binary with these arguments, in a scratch folder of its own, with its cache under the test's folder.
+CommandResult RunFeeler(const std::vector<std::string>& arguments);
+
+/// A new empty folder under the test's temporary folder.
+std::string ScratchFolder(const std::string& name);
+
+std::string ReadFile(const std::string& path);
+void WriteFile(const std::string& path, const std::string& content);
+
+}  // namespace feeler::cli
