@@ -1,0 +1,74 @@
+#include "planner/belief/contact_masks.h"
+
+#include <unordered_map>
+
+namespace feeler::planner {
+namespace {
+
+constexpr int kWindow = 16;
+
+struct HashBits {
+  std::size_t operator()(const Bits256& b) const {
+    std::uint64_t hash = 0x9E3779B97F4A7C15;
+    for (const std::uint64_t w : b.word) {
+      hash = (hash ^ w) * 0xFF51AFD7ED558CCD;
+      hash ^= hash >> 32;
+    }
+    return static_cast<std::size_t>(hash);
+  }
+};
+
+/// True where the step is blocked and the tool can be there at all: outside the target, or where a step free by the map
+/// leads.
+bool StepMatters(const ContactMap& map, const Cell& displacement, Direction d, int orientation) {
+  if (map.StepFree(displacement, d, orientation)) return false;
+  if (!map.Blocked(displacement, orientation)) return true;
+  for (const Direction from : kDirections) {
+    const Cell before = displacement - UnitCell(from);
+    if (!map.Blocked(before, orientation) && map.StepFree(before, from, orientation)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+ContactMasks::ContactMasks(const ContactMap& map) {
+  // One cell beyond the map's domain everything repeats, save steps back into it; a window reaches 15 cells down from
+  // its corner.
+  domain_ = {map.domain().min - Cell::Ones(), map.domain().max + Cell(kWindow, kWindow, 1)};
+  size_ = domain_.Size();
+  stride_ = static_cast<std::size_t>(domain_.Count());
+  index_.assign(stride_ * kDirectionCount * static_cast<std::size_t>(map.orientations()), 0);
+  masks_.emplace_back();
+  std::unordered_map<Bits256, std::uint32_t, HashBits> known = {{Bits256{}, 0}};
+  const CellBox sampled = {domain_.min, map.domain().max + Cell::Ones()};
+  for (int o = 0; o < map.orientations(); ++o) {
+    for (const Direction d : kDirections) {
+      std::uint32_t* const plane = &index_[static_cast<std::size_t>(o * kDirectionCount + IndexOf(d)) * stride_];
+      for (int z = 0; z < size_.z(); ++z) {
+        std::vector<Bits256> column(static_cast<std::size_t>(size_.x()));
+        for (int y = 1 - kWindow; y < size_.y(); ++y) {
+          const auto blocked = [&](int x) {
+            return StepMatters(map, sampled.Clamp(domain_.min + Cell(x, y, z)), d, o);
+          };
+          std::uint64_t row = 0;
+          bool last = blocked(0);
+          if (last) row = 0xFFFF;
+          for (int x = 0; x < size_.x(); ++x) {
+            if (domain_.min.x() + x <= sampled.max.x()) last = blocked(x);
+            row = (row << 1 | (last ? 1U : 0U)) & 0xFFFF;
+            Bits256& mask = column[static_cast<std::size_t>(x)];
+            mask = mask.Up(kWindow);
+            mask.word[0] |= row;
+            if (y < 0 || !mask.Any()) continue;
+            const auto [at, added] = known.try_emplace(mask, static_cast<std::uint32_t>(masks_.size()));
+            if (added) masks_.push_back(mask);
+            plane[static_cast<std::size_t>((z * size_.y() + y) * size_.x() + x)] = at->second;
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace feeler::planner

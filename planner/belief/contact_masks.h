@@ -1,0 +1,41 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "core/direction.h"
+#include "core/lattice.h"
+#include "planner/belief/bits256.h"
+#include "planner/contact/contact_map.h"
+
+namespace feeler::planner {
+
+/// The contact map turned round: for the tool at one place, which of a 16 x 16 window of hypotheses block its next
+/// step. Splitting a belief by a step is then a handful of word operations. Masks repeat, so each distinct one is
+/// stored once and looked up by index; index 0 is the empty mask. Immutable; safe to read from many threads.
+class ContactMasks {
+ public:
+  explicit ContactMasks(const ContactMap& map);
+
+  /// Index of the mask of a window: bit x + 16 y is set iff the step in direction `d` from displacement `corner` - (x,
+  /// y, 0) is blocked. `corner` is the displacement r - h of the window's corner hypothesis. Displacements that no
+  /// motion can reach (inside the target) are left out of the masks.
+  std::uint32_t Index(const Cell& corner, Direction d, int orientation) const {
+    const Cell c = domain_.Clamp(corner) - domain_.min;
+    const std::size_t plane = static_cast<std::size_t>(orientation * kDirectionCount + IndexOf(d)) * stride_;
+    return index_[plane + static_cast<std::size_t>((c.z() * size_.y() + c.y()) * size_.x() + c.x())];
+  }
+  const Bits256& Mask(std::uint32_t index) const { return masks_[index]; }
+  std::size_t distinct() const { return masks_.size(); }
+  std::size_t bytes() const { return index_.size() * sizeof(index_[0]) + masks_.size() * sizeof(Bits256); }
+
+ private:
+  CellBox domain_;  ///< of window corners; beyond it masks repeat
+  Cell size_;
+  std::size_t stride_ = 0;
+  std::vector<std::uint32_t> index_;
+  std::vector<Bits256> masks_;
+};
+
+}  // namespace feeler::planner

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "core/lattice.h"
+#include "planner/belief/hypothesis_sets.h"
+
+namespace feeler::planner {
+
+/// A lower bound on the optimal expected cost of a belief, times the weight of the belief. One object serves one belief
+/// store (it may cache per set); the tables behind it are shared. Infinity where some pair cannot be told apart.
+///
+/// Laws: admissible (at most weight * V*), zero at goals, and consistent: weight(b) h(b) <= cost of an action + sum
+/// over its successors.
+class BeliefHeuristic {
+ public:
+  virtual ~BeliefHeuristic() = default;
+  /// `robot` is relative to the set's frame; `frame` in problem coordinates (zero where translates are one belief).
+  virtual double Weighted(SetId set, const Cell& robot, const Cell& frame) = 0;
+};
+
+}  // namespace feeler::planner

@@ -1,0 +1,83 @@
+#include "planner/heuristic/certificate.h"
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "planner/heuristic/neighbour_masks.h"
+
+namespace feeler::planner {
+
+CertificateHeuristic::CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table)
+    : sets_(sets), table_(std::move(table)) {
+  uniform_ = sets_.uniform();
+}
+
+const CertificateHeuristic::Terms& CertificateHeuristic::Prepare(SetId set) {
+  if (set >= terms_.size()) terms_.resize(sets_.count());
+  Terms& terms = terms_[set];
+  if (terms.ready) return terms;
+  terms.ready = true;
+  terms.first = static_cast<std::uint32_t>(offsets_.size());
+  terms.count = sets_.info(set).size;
+  std::array<Cell, 6> neighbours;
+  for (int i = 0; i < 6; ++i) neighbours[static_cast<std::size_t>(i)] = table_->neighbour(i);
+  NeighbourMasks(sets_, set, neighbours, masks_);
+  const auto strides = table_->strides();
+  const auto plane = static_cast<std::int64_t>(table_->plane_size());
+  std::size_t k = 0;
+  sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
+    offsets_.push_back((std::int64_t{orientation} * CertificateTable::kMasks + masks_[k++]) * plane -
+                       (h.x() * strides[0] + h.y() * strides[1] + h.z() * strides[2]));
+    if (!uniform_) weights_.push_back(sets_.Weight(layer, bit));
+  });
+  return terms;
+}
+
+double CertificateHeuristic::Weighted(SetId set, const Cell& robot, const Cell& frame) {
+  static_cast<void>(frame);  // depends on displacements alone
+  const HypothesisSets::Info& info = sets_.info(set);
+  if (info.goal) return 0.0;
+  const CellBox& domain = table_->domain();
+  if (!domain.Contains(robot - info.low) || !domain.Contains(robot - info.high)) return Slow(set, robot);
+  const Terms& terms = Prepare(set);
+  const std::uint16_t* const values = table_->values();
+  const auto base =
+      static_cast<std::int64_t>(table_->Index(robot - info.low)) +
+      (info.low.x() * table_->strides()[0] + info.low.y() * table_->strides()[1] + info.low.z() * table_->strides()[2]);
+  const std::int64_t* const offsets = offsets_.data() + terms.first;
+  if (uniform_) {
+    std::uint64_t sum = 0;
+    std::uint32_t worst = 0;
+    for (std::uint32_t i = 0; i < terms.count; ++i) {
+      const std::uint32_t value = values[base + offsets[i]];
+      worst = worst > value ? worst : value;
+      sum += value;
+    }
+    if (worst == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
+    return static_cast<double>(sum) * table_->unit();
+  }
+  double sum = 0.0;
+  for (std::uint32_t i = 0; i < terms.count; ++i) {
+    const std::uint16_t value = values[base + offsets[i]];
+    if (value == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
+    sum += weights_[terms.first + i] * value;
+  }
+  return sum * table_->unit();
+}
+
+double CertificateHeuristic::Slow(SetId set, const Cell& robot) {
+  std::array<Cell, 6> neighbours;
+  for (int i = 0; i < 6; ++i) neighbours[static_cast<std::size_t>(i)] = table_->neighbour(i);
+  NeighbourMasks(sets_, set, neighbours, masks_);
+  double sum = 0.0;
+  std::size_t k = 0;
+  sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
+    const std::uint16_t value = table_->At(robot - h, masks_[k++], orientation);
+    sum += value == CertificateTable::kUnreachable ? std::numeric_limits<double>::infinity()
+                                                   : sets_.Weight(layer, bit) * value;
+  });
+  return sum * table_->unit();
+}
+
+}  // namespace feeler::planner

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "planner/heuristic/belief_heuristic.h"
+#include "planner/heuristic/certificate_table.h"
+
+namespace feeler::planner {
+
+/// Sum over the hypotheses of a belief of the cost to tell each from those of its neighbours that are in the belief
+/// (see CertificateTable).
+class CertificateHeuristic final : public BeliefHeuristic {
+ public:
+  CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table);
+  double Weighted(SetId set, const Cell& robot, const Cell& frame) override;
+
+ private:
+  /// One hypothesis: where its value lies relative to the robot's place in plane 0.
+  struct Terms {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    bool ready = false;
+  };
+  const Terms& Prepare(SetId set);
+  double Slow(SetId set, const Cell& robot);
+
+  const HypothesisSets& sets_;
+  std::shared_ptr<const CertificateTable> table_;
+  std::vector<Terms> terms_;
+  std::vector<std::int64_t> offsets_;
+  std::vector<double> weights_;  ///< beside `offsets_` for a prior that is not uniform
+  std::vector<std::uint8_t> masks_;
+  std::vector<Slab> scratch_;
+  bool uniform_ = true;
+};
+
+}  // namespace feeler::planner

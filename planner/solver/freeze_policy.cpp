@@ -1,0 +1,126 @@
+#include "planner/solver/freeze_policy.h"
+
+#include <array>
+#include <cassert>
+#include <map>
+#include <set>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+namespace feeler::planner {
+namespace {
+
+class Freezer {
+ public:
+  Freezer(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of) : graph_(graph), action_of_(action_of) {}
+
+  Policy Run() {
+    const BeliefId start = graph_.Start();
+    if (start == kNoBelief) {
+      // The frame of the root is the problem's.
+      const SetId set = graph_.sets().start();
+      policy_.root = LeafNode(set, graph_.sets().start_frame());
+    } else {
+      policy_.root = Visit(start, graph_.sets().start_frame());
+    }
+    policy_.expected_cost = policy_.nodes[policy_.root].expected_cost;
+    return std::move(policy_);
+  }
+
+ private:
+  /// Depth first, iteratively: successors are numbered before the nodes that lead to them. `root_frame` is added to the
+  /// frame of the root, so that its coordinates are the problem's.
+  std::uint32_t Visit(BeliefId root, const Cell& root_frame) {
+    std::vector<std::pair<BeliefId, bool>> stack = {{root, false}};
+    while (!stack.empty()) {
+      const auto [b, children_done] = stack.back();
+      stack.pop_back();
+      if (index_.contains(b)) continue;
+      const BeliefAction action = graph_.Actions(b)[static_cast<std::size_t>(action_of_(b))];
+      if (!children_done) {
+        stack.emplace_back(b, true);
+        graph_.ForEachSuccessor(action, [&](BeliefId next) {
+          if (!index_.contains(next)) stack.emplace_back(next, false);
+        });
+        continue;
+      }
+      PolicyNode node;
+      node.move = {action.direction, action.cells};
+      const double weight = graph_.Weight(b);
+      for (const BeliefOutcome& outcome : graph_.Outcomes(b, node.move)) {
+        PolicyBranch branch;
+        branch.outcome = outcome.outcome;
+        branch.probability = outcome.weight / weight;
+        Cell shift = outcome.shift;
+        if (!graph_.canonical()) {
+          // All nodes in problem coordinates.
+          shift = Cell::Zero();
+        } else if (b == root) {
+          shift += root_frame;
+        }
+        const Cell leaf_frame = graph_.canonical() ? Cell(Cell::Zero()) : Cell(graph_.frame(b) + outcome.shift);
+        branch.next = outcome.next == kNoBelief ? LeafNode(outcome.set, leaf_frame) : index_.at(outcome.next);
+        branch.shift = shift;
+        node.expected_cost +=
+            branch.probability * (graph_.problem().cost.Of(outcome.outcome) + policy_.nodes[branch.next].expected_cost);
+        node.branches.push_back(branch);
+      }
+      index_[b] = static_cast<std::uint32_t>(policy_.nodes.size());
+      policy_.nodes.push_back(std::move(node));
+    }
+    return index_.at(root);
+  }
+
+  std::uint32_t LeafNode(SetId set, const Cell& frame) {
+    const auto key = std::make_tuple(set, frame.x(), frame.y(), frame.z());
+    const auto known = leaves_.find(key);
+    if (known != leaves_.end()) return known->second;
+    PolicyNode leaf;
+    graph_.sets().ForEach(set, [&](const Cell& offset, int orientation, std::uint32_t, int) {
+      leaf.leaf.push_back({Cell(offset + frame), orientation});
+    });
+    const auto index = static_cast<std::uint32_t>(policy_.nodes.size());
+    policy_.nodes.push_back(std::move(leaf));
+    leaves_.emplace(key, index);
+    return index;
+  }
+
+  BeliefGraph& graph_;
+  const std::function<int(BeliefId)>& action_of_;
+  Policy policy_;
+  std::unordered_map<BeliefId, std::uint32_t> index_;
+  std::map<std::tuple<SetId, int, int, int>, std::uint32_t> leaves_;
+};
+
+}  // namespace
+
+Policy FreezePolicy(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of) {
+  return Freezer(graph, action_of).Run();
+}
+
+bool StaysInWorkspace(const Problem& problem, const Policy& policy) {
+  // The cells of a node depend on how it is reached, relative to its frame; follow each distinct pair once.
+  struct Place {
+    std::uint32_t node;
+    Cell robot;
+  };
+  std::set<std::tuple<std::uint32_t, int, int, int>> seen;
+  std::vector<Place> open = {{policy.root, problem.start}};
+  while (!open.empty()) {
+    const Place place = open.back();
+    open.pop_back();
+    if (!seen.emplace(place.node, place.robot.x(), place.robot.y(), place.robot.z()).second) continue;
+    const PolicyNode& node = policy.nodes[place.node];
+    if (node.is_leaf()) continue;
+    const Cell step = UnitCell(node.move.direction);
+    if (!problem.workspace.Contains(place.robot + node.move.cells * step)) return false;
+    for (const PolicyBranch& branch : node.branches) {
+      open.push_back({branch.next, place.robot + branch.outcome.cells * step});
+    }
+  }
+  return true;
+}
+
+}  // namespace feeler::planner

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <functional>
+
+#include "planner/belief/belief_graph.h"
+#include "planner/solver/policy.h"
+
+namespace feeler::planner {
+
+/// The policy that takes action `action_of(b)` (an index into BeliefGraph::Actions) at every belief it reaches from the
+/// start; must be acyclic. Costs are summed exactly; the lower bound is left zero.
+Policy FreezePolicy(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of);
+
+/// True if every move stays in the problem's workspace (for graphs that took it to be unbounded).
+bool StaysInWorkspace(const Problem& problem, const Policy& policy);
+
+}  // namespace feeler::planner

@@ -1,0 +1,29 @@
+#include "planner/solver/planning_tables.h"
+
+#include "planner/heuristic/certificate.h"
+
+namespace feeler::planner {
+namespace {
+
+Cell SpreadOf(const Problem& problem) {
+  return problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
+}
+
+}  // namespace
+
+PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& /*options*/)
+    : map_(problem.map), masks_(*problem.map) {
+  certificate_ = std::make_shared<CertificateTable>(
+      *problem.map, LowerStepCosts(problem.cost, problem.move_lengths.back()), SpreadOf(problem));
+}
+
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& /*problem*/, const HypothesisSets& sets,
+                                                               const SolverOptions& /*options*/) const {
+  return std::make_unique<CertificateHeuristic>(sets, certificate_);
+}
+
+std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options) {
+  return std::make_shared<PlanningTables>(problem, options);
+}
+
+}  // namespace feeler::planner

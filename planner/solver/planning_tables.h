@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+
+#include "planner/belief/contact_masks.h"
+#include "planner/heuristic/belief_heuristic.h"
+#include "planner/heuristic/certificate_table.h"
+#include "planner/solver/solve.h"
+
+namespace feeler::planner {
+
+class PlanningTables {
+ public:
+  PlanningTables(const Problem& problem, const SolverOptions& options);
+
+  const ContactMasks& masks() const { return masks_; }
+  /// The heuristic of a belief store of `problem`.
+  std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets,
+                                                 const SolverOptions& options) const;
+
+ private:
+  std::shared_ptr<const ContactMap> map_;
+  ContactMasks masks_;
+  std::shared_ptr<const CertificateTable> certificate_;
+};
+
+}  // namespace feeler::planner

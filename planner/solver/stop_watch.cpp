@@ -1,0 +1,35 @@
+#include "planner/solver/stop_watch.h"
+
+#include <ctime>
+
+namespace feeler::planner {
+
+double ThreadCpuSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+StopWatch::StopWatch(const SolverOptions& options)
+    : options_(options), start_(std::chrono::steady_clock::now()), cpu_start_s_(ThreadCpuSeconds()) {}
+
+double StopWatch::wall_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
+  if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
+  if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
+  if ((++calls_ & 63) == 0 && wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
+  return std::nullopt;
+}
+
+bool StopWatch::RowDue() {
+  if (!options_.on_bounds || (calls_ & 15) != 0) return false;
+  const double now_s = wall_s();
+  if (now_s < next_row_s_) return false;
+  next_row_s_ = now_s < 0.1 ? 0.1 : now_s * 1.25;
+  return true;
+}
+
+}  // namespace feeler::planner
