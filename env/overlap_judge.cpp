@@ -3,6 +3,8 @@
 #include <array>
 #include <utility>
 
+#include "env/convex_shape.h"
+
 namespace feeler::env {
 namespace {
 
@@ -12,17 +14,6 @@ void Place(mjData& data, int geom, const Pose& pose) {
 }
 
 }  // namespace
-
-Pose GeomInBody(const mjData& data, int geom, int body) {
-  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  Pose world_T_geom = Pose::Identity();
-  world_T_geom.translation() = Eigen::Map<const Eigen::Vector3d>(data.geom_xpos + 3 * geom);
-  world_T_geom.linear() = Eigen::Map<const RowMajor>(data.geom_xmat + 9 * geom);
-  Pose world_T_body = Pose::Identity();
-  world_T_body.translation() = Eigen::Map<const Eigen::Vector3d>(data.xpos + 3 * body);
-  world_T_body.linear() = Eigen::Map<const RowMajor>(data.xmat + 9 * body);
-  return world_T_body.inverse(Eigen::Isometry) * world_T_geom;
-}
 
 OverlapJudge::OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
                            const Eigen::Quaterniond& orientation)
@@ -34,15 +25,14 @@ OverlapJudge::OverlapJudge(const TaskModel& task_model, std::vector<int> target_
   // The default tolerance of the convex collider, 1e-6 m, is half of the accuracy asked of travel distances.
   model_->opt.mpr_tolerance = 1e-8;
   model_->opt.mpr_iterations = 200;
-  mj_kinematics(model_.get(), data_.get());
   std::vector<std::pair<int, Pose>> placed;
   for (const int geom : tool_geoms_) {
-    placed.emplace_back(geom, GeomInBody(*data_, geom, task_model.tool_body));
+    placed.emplace_back(geom, GeomInBody(*model_, geom, task_model.tool_body));
     tool_position_m_[static_cast<std::size_t>(geom)] = placed.back().second.translation();
   }
   for (const int geom : target_geoms_) {
     placed.emplace_back(
-        geom, MakePose(Eigen::Vector3d::Zero(), orientation) * GeomInBody(*data_, geom, task_model.target_body));
+        geom, MakePose(Eigen::Vector3d::Zero(), orientation) * GeomInBody(*model_, geom, task_model.target_body));
   }
   for (const auto& [geom, pose] : placed) Place(*data_, geom, pose);
 }

@@ -35,7 +35,4 @@ class OverlapJudge {
   std::vector<Eigen::Vector3d> tool_position_m_;  ///< in the tool frame, by geom id
 };
 
-/// Pose of a geom in the frame of a body, in the state of `data`.
-Pose GeomInBody(const mjData& data, int geom, int body);
-
 }  // namespace feeler::env

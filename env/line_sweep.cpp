@@ -1,0 +1,118 @@
+#include "env/line_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace feeler::env {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// MuJoCo's convex collider decides overlaps shallower than this, measured along the normal, one way or the other.
+constexpr double kJudgeDepth_m = 2e-6;
+
+}  // namespace
+
+ObstacleSet::ObstacleSet(const TaskModel& model, std::vector<int> geoms, const Eigen::Quaterniond& target_orientation)
+    : task_model(&model), target_geoms(std::move(geoms)), orientation(target_orientation) {
+  const Pose rotation = MakePose(Eigen::Vector3d::Zero(), orientation);
+  for (const int tool_geom : model.tool_geoms) {
+    const ConvexShape tool(*model.model, tool_geom, GeomInBody(*model.model, tool_geom, model.tool_body));
+    for (const int target_geom : target_geoms) {
+      const Pose pose = rotation * GeomInBody(*model.model, target_geom, model.target_body);
+      if (model.model->geom_type[target_geom] == mjGEOM_PLANE) {
+        const Eigen::Vector3d normal = pose.linear().col(2);
+        half_spaces.push_back(
+            {tool_geom, target_geom, normal, normal.dot(pose.translation()) - normal.dot(tool.Support(-normal))});
+      } else {
+        obstacles.push_back(
+            {tool_geom, target_geom, ConvexObstacle(tool, ConvexShape(*model.model, target_geom, pose))});
+      }
+    }
+  }
+}
+
+LineSweep::LineSweep(const ObstacleSet& set, double accuracy_m)
+    : set_(set), accuracy_m_(accuracy_m), judge_(*set.task_model, set.target_geoms, set.orientation) {}
+
+double LineSweep::JudgeEnd(int tool_geom, int target_geom, int axis, Eigen::Vector3d& point_m, double end_m,
+                           double inside_m, double probe_m) {
+  const auto overlap = [&](double t) {
+    point_m[axis] = t;
+    return judge_.Overlap(tool_geom, target_geom, point_m);
+  };
+  const double outward = end_m < inside_m ? -1.0 : 1.0;
+  double inner = end_m - outward * std::min(probe_m, std::abs(end_m - inside_m));
+  double outer = end_m + outward * probe_m;
+  const bool inner_overlaps = overlap(inner);
+  const bool outer_overlaps = overlap(outer);
+  if (inner_overlaps && !outer_overlaps) return end_m;
+
+  if (!inner_overlaps) {
+    if (!overlap(inside_m)) return inside_m;  // MuJoCo sees no overlap here at all
+    outer = inner;
+    inner = inside_m;
+  } else {
+    double reach = probe_m;
+    do {
+      inner = outer;
+      reach *= 2;
+      outer = end_m + outward * reach;
+    } while (overlap(outer) && reach < 1.0);
+  }
+  while (std::abs(outer - inner) > accuracy_m_ / 4) {
+    const double middle = 0.5 * (inner + outer);
+    (overlap(middle) ? inner : outer) = middle;
+  }
+  const double judged = 0.5 * (inner + outer);
+  ++corrections_;
+  largest_correction_m_ = std::max(largest_correction_m_, std::abs(judged - end_m));
+  return judged;
+}
+
+void LineSweep::Judge(int tool_geom, int target_geom, int axis, Eigen::Vector3d point_m, Cut& cut) {
+  const double middle = 0.5 * (cut.low_m + cut.high_m);
+  const auto probe = [&](double slope) { return std::max(accuracy_m_, kJudgeDepth_m / std::max(slope, 1e-3)); };
+  const double low = JudgeEnd(tool_geom, target_geom, axis, point_m, cut.low_m, middle, probe(cut.low_slope));
+  const double high = JudgeEnd(tool_geom, target_geom, axis, point_m, cut.high_m, middle, probe(cut.high_slope));
+  cut.low_m = low;
+  cut.high_m = high;
+}
+
+const std::vector<BlockedStretch>& LineSweep::Sweep(int axis, const Eigen::Vector3d& point_m, bool judged) {
+  stretches_.clear();
+  for (const ObstacleSet::Obstacle& obstacle : set_.obstacles) {
+    auto cut = obstacle.shape.CutBy(axis, point_m);
+    if (!cut) continue;
+    if (judged) Judge(obstacle.tool_geom, obstacle.target_geom, axis, point_m, *cut);
+    if (cut->low_m < cut->high_m) stretches_.push_back({cut->low_m, cut->high_m});
+  }
+  for (const ObstacleSet::HalfSpace& space : set_.half_spaces) {
+    Eigen::Vector3d across = point_m;
+    across[axis] = 0;
+    const double slope = space.normal[axis];
+    const double room = space.offset_m - space.normal.dot(across);
+    if (std::abs(slope) < 1e-12) {
+      if (room > 0) stretches_.push_back({-kInfinity, kInfinity});
+    } else if (slope > 0) {
+      stretches_.push_back({-kInfinity, room / slope});
+    } else {
+      stretches_.push_back({room / slope, kInfinity});
+    }
+  }
+  std::sort(stretches_.begin(), stretches_.end(),
+            [](const BlockedStretch& a, const BlockedStretch& b) { return a.low_m < b.low_m; });
+  std::size_t kept = 0;
+  for (const BlockedStretch& stretch : stretches_) {
+    if (kept > 0 && stretch.low_m <= stretches_[kept - 1].high_m + accuracy_m_) {
+      stretches_[kept - 1].high_m = std::max(stretches_[kept - 1].high_m, stretch.high_m);
+    } else {
+      stretches_[kept++] = stretch;
+    }
+  }
+  stretches_.resize(kept);
+  return stretches_;
+}
+
+}  // namespace feeler::env
