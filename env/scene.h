@@ -28,7 +28,7 @@ struct SceneOptions {
   double armature_kg_m2 = 0.1;
   double contact_friction = 0.3;  ///< sliding friction where the task file gives none
   bool workbench = true;          ///< a bench under robot and fixtures and a floor, unless the task file has its own
-  int max_constraints = 300;      ///< njmax; mjData grows with its square
+  int max_constraints = 200;      ///< njmax; mjData grows with its square (2.3 MB at 200)
   int max_contacts = 100;         ///< nconmax
 };
 
