@@ -1,0 +1,88 @@
+#include "policies/storage/row.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/error.h"
+#include "policies/formats/bytes.h"
+#include "policies/formats/policy_blob.h"
+#include "policies/storage/hash.h"
+
+namespace feeler::policies {
+namespace {
+
+bool SameBits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
+
+}  // namespace
+
+double StoredProblem::Ratio() const {
+  if (lower_bound > 0.0) return expected_cost / lower_bound;
+  return expected_cost == lower_bound ? 1.0 : std::numeric_limits<double>::infinity();
+}
+
+std::string ExtentsKey(const planner::Extents& extents) {
+  return fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz);
+}
+
+std::string RowBytes(const ProblemRow& row) {
+  const StoredProblem& p = row.problem;
+  ByteWriter out;
+  out.Text(ExtentsKey(p.extents));
+  out.Text(p.status);
+  out.Text(p.solver);
+  out.Double(p.epsilon);
+  out.Double(p.expected_cost);
+  out.Double(p.lower_bound);
+  out.Signed(p.expansions);
+  out.Fixed64(p.seed);
+  out.Text(p.version);
+  out.Text(row.blob);
+  return out.Take();
+}
+
+std::uint64_t RowChecksum(const ProblemRow& row) { return Hash64(RowBytes(row)); }
+
+std::uint64_t TimingChecksum(const std::string& extents_key, double cpu_s, double wall_s) {
+  ByteWriter out;
+  out.Text(extents_key);
+  out.Double(cpu_s);
+  out.Double(wall_s);
+  return Hash64(out.bytes());
+}
+
+ProblemRow ToRow(const StoredProblem& problem) {
+  const auto require = [&](bool condition, const char* what) {
+    if (!condition) throw std::invalid_argument("problem " + ExtentsKey(problem.extents) + ": " + what);
+  };
+  require(problem.extents.nx >= 1 && problem.extents.ny >= 1 && problem.extents.nz >= 1, "extents below 1");
+  require(!std::isnan(problem.epsilon), "epsilon is not a number");
+  require(problem.lower_bound >= 0.0 && std::isfinite(problem.lower_bound), "lower bound negative or not finite");
+  require(std::isfinite(problem.cpu_s) && std::isfinite(problem.wall_s), "times are not finite");
+  ProblemRow row{problem, ""};
+  row.problem.epsilon += 0.0;  // SQLite does not keep the sign of zero
+  row.problem.policy.reset();
+  if (problem.policy) {
+    require(SameBits(problem.policy->expected_cost, problem.expected_cost), "expected cost is not the policy's");
+    require(SameBits(problem.policy->lower_bound, problem.lower_bound), "lower bound is not the policy's");
+    row.blob = EncodePolicyBlob(*problem.policy);
+  } else {
+    require(problem.expected_cost == std::numeric_limits<double>::infinity(), "expected cost without a policy");
+  }
+  return row;
+}
+
+StoredProblem FromRow(const ProblemRow& row, const std::string& where) {
+  StoredProblem problem = row.problem;
+  if (row.blob.empty()) return problem;
+  problem.policy = DecodePolicyBlob(row.blob, where);
+  if (!SameBits(problem.policy->expected_cost, problem.expected_cost) ||
+      !SameBits(problem.policy->lower_bound, problem.lower_bound)) {
+    throw InputError(where, "the row's numbers are not those of its policy", "delete the file and make it again");
+  }
+  return problem;
+}
+
+}  // namespace feeler::policies
