@@ -1,0 +1,134 @@
+#include "execution/confirm.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "execution/free_path.h"
+
+namespace feeler::execution {
+namespace {
+
+/// A probe begins this far from the wall it expects, in cells: room for the uncertainty of the axis.
+constexpr double kNearest = 1.5;
+constexpr double kFarthest = 3.5;
+/// Lines that meet the same wall differ by less than this.
+constexpr double kSameWall = 0.2;
+
+bool IsBroadWall(const planner::ContactMap& map, const Cell& from, Direction direction, int orientation) {
+  const double travel = map.Travel(from, direction, orientation);
+  if (travel < kNearest || travel > kFarthest) return false;
+  const int u = (AxisOf(direction) + 1) % 3;
+  const int v = (AxisOf(direction) + 2) % 3;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      Cell line = from;
+      line[u] += i;
+      line[v] += j;
+      if (map.Blocked(line, orientation)) return false;
+      if (std::abs(map.Travel(line, direction, orientation) - travel) > kSameWall) return false;
+    }
+  }
+  return true;
+}
+
+Cell Nearest(const Eigen::Vector3d& cells) {
+  return {static_cast<int>(std::lround(cells.x())), static_cast<int>(std::lround(cells.y())),
+          static_cast<int>(std::lround(cells.z()))};
+}
+
+/// The axis across the insertion that is most in need of a touch; -1 if none is.
+int LoosestAxis(const TargetFit& fit, Direction insertion, double limit_cells, const std::array<bool, 3>& hopeless) {
+  int loosest = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    if (axis == AxisOf(insertion) || fit.pinned[i] || hopeless[i] || fit.half_width[axis] <= limit_cells) continue;
+    if (loosest < 0 || fit.half_width[axis] > fit.half_width[loosest]) loosest = axis;
+  }
+  return loosest;
+}
+
+}  // namespace
+
+std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& map, const Eigen::Vector3d& displacement,
+                                                   int axis, int orientation) {
+  ConfirmingTouch touch;
+  const auto suits = [&](const Cell& cell) {
+    for (const int sign : {1, -1}) {
+      const Direction direction = MakeDirection(axis, sign);
+      if (IsBroadWall(map, cell, direction, orientation)) {
+        touch.direction = direction;
+        touch.travel_cells = map.Travel(cell, direction, orientation);
+        return true;
+      }
+    }
+    return false;
+  };
+  const auto path = FindFreePath(map, Nearest(displacement - map.phase()), suits, orientation);
+  if (!path) return std::nullopt;
+  touch.path = *path;
+  return touch;
+}
+
+bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,
+                const std::string& kind, Mover& mover, std::vector<Touch>& evidence) {
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const Eigen::Vector3d from = mover.position();
+    const Eigen::Vector3d to = target + path[i].cast<double>() + map.phase();
+    const std::optional<Direction> direction = DirectionOf(to - from);
+    const MotionReport report = mover.Fast(to, kind);
+    if (!report.contact) continue;
+    if (direction) {
+      Touch touch;
+      touch.direction = *direction;
+      touch.contact = true;
+      touch.start = report.end;
+      touch.start[AxisOf(*direction)] = from[AxisOf(*direction)];
+      touch.travelled = SignOf(*direction) * (report.end - from)[AxisOf(*direction)];
+      evidence.push_back(touch);
+    }
+    const Eigen::Vector3d back = from - report.end;
+    const double length = back.norm();
+    mover.Retreat(length > 1.0 ? Eigen::Vector3d(report.end + back / length) : from);
+    return false;
+  }
+  return true;
+}
+
+TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Eigen::Vector3d& lower,
+                  const Eigen::Vector3d& upper, Mover& mover, std::vector<Touch>& evidence) {
+  const ExecutorOptions& options = mover.options();
+  const double limit_cells = mover.Cells(options.confirm_limit_m);
+  std::array<bool, 3> hopeless{};
+  TargetFit fit = FitTarget(map, evidence, lower, upper, orientation, options.fit);
+  for (int attempt = 0; attempt < options.confirm_attempts; ++attempt) {
+    const int axis = LoosestAxis(fit, insertion, limit_cells, hopeless);
+    if (axis < 0) break;
+    const auto plan = PlanConfirmingTouch(map, mover.position() - fit.position, axis, orientation);
+    if (!plan) {
+      hopeless[static_cast<std::size_t>(axis)] = true;
+      continue;
+    }
+    if (FollowPath(map, fit.position, plan->path, "transfer", mover, evidence)) {
+      const double from = mover.position()[axis];
+      const double farthest = plan->travel_cells + fit.half_width[axis] + options.sure_overtravel_cells;
+      const double nearest = plan->travel_cells - fit.half_width[axis];
+      const MotionReport report =
+          mover.Probe(plan->direction, from + SignOf(plan->direction) * farthest, "confirm",
+                      std::array<double, 2>{nearest, plan->travel_cells + fit.half_width[axis]});
+      Touch touch;
+      touch.direction = plan->direction;
+      touch.contact = report.contact;
+      touch.start = report.end;
+      touch.start[axis] = from;
+      touch.travelled = SignOf(plan->direction) * (report.end[axis] - from);
+      evidence.push_back(touch);
+      const double off = std::max(mover.Cells(options.retreat_m), 0.5);
+      mover.Retreat(report.end - off * UnitVector(plan->direction));
+    }
+    fit = FitTarget(map, evidence, lower, upper, orientation, options.fit);
+  }
+  return fit;
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "core/direction.h"
+#include "core/lattice.h"
+#include "execution/contact_evidence.h"
+#include "execution/mover.h"
+#include "planner/contact/contact_map.h"
+
+namespace feeler::execution {
+
+/// A touch that tells where the target is along an axis: free way points of the tool relative to the target (lattice
+/// displacements, the first is where it is now) and the probe from the last one.
+struct ConfirmingTouch {
+  std::vector<Cell> path;
+  Direction direction = Direction::kPlusX;
+  double travel_cells = 0.0;  ///< predicted, from the last way point
+};
+
+/// The nearest broad wall across `axis`: one that is met at the same place from the eight neighbouring lines as well,
+/// so that an error across the axis does not matter. `displacement`: of the tool from the target, cells. Empty if the
+/// target has no such wall in reach.
+std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& map, const Eigen::Vector3d& displacement,
+                                                   int axis, int orientation);
+
+/// Moves the tool along way points relative to a target at `target` (lattice coordinates). False if a contact came; it
+/// is added to the evidence when it came along an axis, and the tool has come off it.
+bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,
+                const std::string& kind, Mover& mover, std::vector<Touch>& evidence);
+
+/// Touches along the axes across `insertion` that the fit leaves wider than the limit, until none is (or attempts run
+/// out); adds to the evidence. Returns the last fit, of a target in the box [lower, upper].
+TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Eigen::Vector3d& lower,
+                  const Eigen::Vector3d& upper, Mover& mover, std::vector<Touch>& evidence);
+
+}  // namespace feeler::execution

@@ -1,0 +1,130 @@
+#include "execution/contact_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "execution/continuous_travel.h"
+
+namespace feeler::execution {
+namespace {
+
+double ViolationAt(const planner::ContactMap& map, const Touch& touch, const Eigen::Vector3d& displacement,
+                   int orientation) {
+  const double travel = ContinuousTravel(map, displacement, touch.direction, orientation);
+  return touch.contact ? std::abs(touch.travelled - travel) : std::max(0.0, touch.travelled - travel);
+}
+
+struct Score {
+  int violations = std::numeric_limits<int>::max();
+  double squares = 0.0;
+  bool operator<(const Score& other) const {
+    return violations != other.violations ? violations < other.violations : squares < other.squares - 1e-9;
+  }
+};
+
+Score ScoreOf(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& target,
+              int orientation, const FitOptions& options, int give_up_above) {
+  Score score{0, 0.0};
+  for (const Touch& touch : evidence) {
+    const double violation = Violation(map, touch, target, orientation, options.slack_cells);
+    if (violation > options.violation_cells) {
+      if (++score.violations > give_up_above) return {};
+    } else if (touch.contact) {
+      score.squares += violation * violation;
+    }
+  }
+  return score;
+}
+
+/// Grid values of one axis: both ends and steps of at most `step` between them.
+std::vector<double> GridValues(double lower, double upper, double step) {
+  const int intervals = std::max(1, static_cast<int>(std::ceil((upper - lower) / step - 1e-9)));
+  std::vector<double> values;
+  for (int i = 0; i <= intervals; ++i) values.push_back(lower + (upper - lower) * i / intervals);
+  return values;
+}
+
+/// Moves each axis onto the contacts that agree with `fit.position`; marks the axes that have any.
+void SnapToContacts(const planner::ContactMap& map, const std::vector<Touch>& evidence, int orientation,
+                    const FitOptions& options, TargetFit& fit) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Vector3d count = Eigen::Vector3d::Zero();
+  for (const Touch& touch : evidence) {
+    if (!touch.contact) continue;
+    const double travel = ContinuousTravel(map, touch.start - fit.position, touch.direction, orientation);
+    const double residual = touch.travelled - travel;
+    // The grid and its plateau centre add their own error to that of the reading.
+    if (std::abs(residual) > options.violation_cells + options.step_cells) continue;
+    sum[AxisOf(touch.direction)] += SignOf(touch.direction) * residual;
+    count[AxisOf(touch.direction)] += 1.0;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    fit.pinned[static_cast<std::size_t>(axis)] = count[axis] > 0.0;
+    if (count[axis] > 0.0) fit.position[axis] += sum[axis] / count[axis];
+  }
+}
+
+}  // namespace
+
+double Violation(const planner::ContactMap& map, const Touch& touch, const Eigen::Vector3d& target, int orientation,
+                 double slack_cells) {
+  const Eigen::Vector3d displacement = touch.start - target;
+  double least = ViolationAt(map, touch, displacement, orientation);
+  for (int axis = 0; axis < 3 && slack_cells > 0.0; ++axis) {
+    if (axis == AxisOf(touch.direction)) continue;
+    for (const double shift : {-slack_cells, slack_cells}) {
+      if (least == 0.0) return least;
+      Eigen::Vector3d moved = displacement;
+      moved[axis] += shift;
+      least = std::min(least, ViolationAt(map, touch, moved, orientation));
+    }
+  }
+  return least;
+}
+
+TargetFit FitTarget(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& lower,
+                    const Eigen::Vector3d& upper, int orientation, const FitOptions& options) {
+  const std::vector<double> xs = GridValues(lower.x(), upper.x(), options.step_cells);
+  const std::vector<double> ys = GridValues(lower.y(), upper.y(), options.step_cells);
+  const std::vector<double> zs = GridValues(lower.z(), upper.z(), options.step_cells);
+  struct Candidate {
+    Eigen::Vector3d position;
+    double squares;
+  };
+  std::vector<Candidate> best;  // all grid points with the fewest violations so far
+  int fewest = std::numeric_limits<int>::max();
+  for (const double x : xs) {
+    for (const double y : ys) {
+      for (const double z : zs) {
+        const Eigen::Vector3d position(x, y, z);
+        const Score score = ScoreOf(map, evidence, position, orientation, options, fewest);
+        if (score.violations > fewest || score.violations == std::numeric_limits<int>::max()) continue;
+        if (score.violations < fewest) {
+          fewest = score.violations;
+          best.clear();
+        }
+        best.push_back({position, score.squares});
+      }
+    }
+  }
+  double least_squares = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : best) least_squares = std::min(least_squares, candidate.squares);
+  // Points within a grid step of the least squares form the plateau along the axes that are not pinned.
+  const double plateau = least_squares + options.step_cells * options.step_cells;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector3d high = -low;
+  for (const Candidate& candidate : best) {
+    if (candidate.squares > plateau) continue;
+    low = low.cwiseMin(candidate.position);
+    high = high.cwiseMax(candidate.position);
+  }
+  TargetFit fit;
+  fit.violations = fewest;
+  fit.position = 0.5 * (low + high);
+  fit.half_width = 0.5 * (high - low);
+  SnapToContacts(map, evidence, orientation, options, fit);
+  return fit;
+}
+
+}  // namespace feeler::execution

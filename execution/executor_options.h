@@ -1,0 +1,43 @@
+#pragma once
+
+#include "execution/contact_evidence.h"
+#include "execution/outcome_matching.h"
+
+namespace feeler::execution {
+
+/// How a policy is carried out. The defaults suit an ideal arm; `WithFriction` one with joint friction and force noise.
+struct ExecutorOptions {
+  double transfer_speed_m_s = 0.25;  ///< through space known to be free, watched for contact
+  double probe_speed_m_s = 0.05;     ///< where a contact may come
+  double contact_force_n = 5.0;      ///< net force that counts as a contact
+  double shortfall_m = 0.0002;       ///< a motion that ends this far short of its target has met something soft or weak
+  double overtravel_cells = 0.25;    ///< beyond the commanded cell: a wall just behind it is felt, not grazed
+  double sure_overtravel_cells = 0.75;  ///< where every hypothesis predicts contact
+  double fast_margin_cells = 1.0;       ///< the probe begins this far before the nearest predicted contact
+  double free_margin_cells = 0.75;      ///< a move is known to be free if no prediction is nearer behind its end
+  double retreat_m = 0.0005;  ///< at least so far off a wall after contact, or the next sideways move triggers
+  /// An axis across the insertion that no contact has pinned is touched if the evidence leaves it wider than this (half
+  /// width).
+  double confirm_limit_m = 0.0005;
+  int confirm_attempts = 4;
+  int graze_attempts = 3;  ///< shifts of the lattice by edges met within one episode
+  double insertion_speed_m_s = 0.02;
+  double insertion_force_limit_n = 60.0;
+  double insertion_overdrive_m = 0.001;  ///< commanded beyond the depth, so that a compliant tool reaches it
+  int motion_limit = 400;                ///< motions of one episode, whatever the policy
+  double time_limit_s = 120.0;           ///< of one episode, on the clock of the robot
+  MatchOptions matching;
+  FitOptions fit;
+
+  static ExecutorOptions WithFriction() {
+    ExecutorOptions options;
+    options.contact_force_n = 10.0;
+    options.shortfall_m = 0.0004;
+    return options;
+  }
+};
+
+/// Throws InputError naming the option that is out of range or not a number.
+void Validate(const ExecutorOptions& options);
+
+}  // namespace feeler::execution

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/task.h"
+#include "execution/contact_evidence.h"
+#include "execution/mover.h"
+#include "planner/contact/contact_map.h"
+
+namespace feeler::execution {
+
+/// What the executor believes about an insertion, from the measured end pose and its estimate of the target.
+struct InsertionVerdict {
+  bool inserted = false;
+  std::string reason;  ///< "inserted", or why not
+};
+
+/// Moves the tool through free space to a place in front of the opening of a target at `target` (lattice coordinates)
+/// and inserts it compliantly. Throws ExecutionFailure when there is no free way. Contacts on the way are added to the
+/// evidence and end the attempt.
+InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
+                                   int orientation, Mover& mover, std::vector<Touch>& evidence);
+
+}  // namespace feeler::execution

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "execution/contact_evidence.h"
+#include "execution/mover.h"
+#include "execution/outcome_matching.h"
+#include "planner/belief/problem.h"
+#include "policies/policy.h"
+
+namespace feeler::execution {
+
+/// Walks a policy on a robot whose target stands anywhere between the lattice points: turns the policy's moves into
+/// motions, what was felt into outcomes, and keeps the hypotheses that explain it.
+///
+/// The lattice of the policy is tied to the world by an anchor. A contact tells where between two lattice points a wall
+/// stands; the lattice is shifted along that axis so that the wall stands where the hypothesis says (mid-cell), and
+/// later decisions along the axis are no longer near a tie.
+class Localizer {
+ public:
+  /// All arguments outlive the localizer. The tool stands at the start cell of the problem.
+  Localizer(const planner::Problem& problem, policies::Policy& policy, Mover& mover, ExecutionRecord& record);
+
+  /// Until the policy wants to insert, or one hypothesis is left. Throws ExecutionFailure.
+  policies::Insert Run();
+
+  const std::vector<TrackedHypothesis>& hypotheses() const { return tracked_; }
+  const std::vector<Touch>& evidence() const { return evidence_; }
+
+ private:
+  struct Prediction {
+    double nearest = 0.0;      ///< least travel under a hypothesis, cells from the lattice point of the robot cell
+    double farthest = 0.0;     ///< greatest
+    bool sure_contact = true;  ///< every hypothesis has a contact in lattice terms
+  };
+
+  policies::Belief View() const;
+  policies::Decision Ask();
+  /// Where the tool is to stand in the present robot cell.
+  Eigen::Vector3d Station() const { return robot_.cast<double>() + problem_.map->phase() + anchor_ + kept_offset_; }
+  Prediction Predict(const GuardedMove& move) const;
+
+  void Carry(const GuardedMove& move);
+  /// Takes a move that is known to be free into the pending motion.
+  void Postpone(const GuardedMove& move);
+  /// Carries out the pending motion.
+  void Flush();
+  void Feel(const GuardedMove& move, const Prediction& prediction);
+  Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
+  /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it.
+  bool TakeOver(const GuardedMove& move, const Touch& touch);
+  /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.
+  void ShiftOffEdge(const Touch& touch, Direction direction);
+  void RetreatFromContact(Direction direction);
+  [[noreturn]] void FailOffTree(const Touch& touch) const;
+
+  const planner::Problem& problem_;
+  policies::Policy& policy_;
+  Mover& mover_;
+  ExecutionRecord& record_;
+  std::vector<TrackedHypothesis> tracked_;
+  std::vector<Touch> evidence_;
+  Cell robot_;
+  Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
+  std::optional<Direction> pending_;                       ///< the tool still has to go this way to Station()
+};
+
+}  // namespace feeler::execution

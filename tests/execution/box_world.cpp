@@ -1,0 +1,194 @@
+#include "tests/execution/box_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace feeler::execution {
+namespace {
+
+constexpr double kClearance = 0.0005;  // of the opening, each side
+constexpr double kChamfer = 0.001;
+constexpr double kMotionOverhead = 0.08;  // seconds to start and stop
+
+/// Distance to the entry of one box shrunk across the motion by `slip`, infinity without.
+double EntryDistance(const Box& box, const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double slip) {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  double enter = -kNever;
+  double leave = kNever;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(direction[axis]) < 1e-3) {
+      if (from[axis] <= box.min[axis] + slip || from[axis] >= box.max[axis] - slip) return kNever;
+      continue;
+    }
+    double a = (box.min[axis] - from[axis]) / direction[axis];
+    double b = (box.max[axis] - from[axis]) / direction[axis];
+    if (a > b) std::swap(a, b);
+    enter = std::max(enter, a);
+    leave = std::min(leave, b);
+  }
+  // A point a little inside a wall, as after a contact, is at it.
+  constexpr double kAtWall = 0.0008;
+  if (enter >= leave || enter < -kAtWall) return kNever;
+  return std::max(0.0, enter);
+}
+
+double Distance(const std::vector<Box>& boxes, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                double slip) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Box& box : boxes) nearest = std::min(nearest, EntryDistance(box, from, direction, slip));
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<Box> HousingOverPanel() {
+  return {{{-0.041, -0.033, -0.030}, {0.041, 0.033, 0.0}}, {{-1.0, -1.0, -1.0}, {1.0, 1.0, -0.030}}};
+}
+
+double DistanceToContact(const std::vector<Box>& boxes, const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
+  return Distance(boxes, from, direction, 0.0);
+}
+
+std::shared_ptr<const planner::ContactMap> MapOf(const std::vector<Box>& boxes, double cell_m,
+                                                 const Eigen::Vector3d& phase, const CellBox& domain) {
+  planner::ContactMap::Layer layer;
+  const auto count = static_cast<std::size_t>(domain.Count());
+  layer.blocked.assign(count, 0);
+  for (auto& travel : layer.travel) travel.assign(count, 0.0F);
+  double margin = 0.5;
+  std::size_t i = 0;
+  for (int z = domain.min.z(); z <= domain.max.z(); ++z) {
+    for (int y = domain.min.y(); y <= domain.max.y(); ++y) {
+      for (int x = domain.min.x(); x <= domain.max.x(); ++x, ++i) {
+        const Eigen::Vector3d at = cell_m * (Eigen::Vector3d(x, y, z) + phase);
+        for (const Box& box : boxes) {
+          if ((at.array() > box.min.array()).all() && (at.array() < box.max.array()).all()) layer.blocked[i] = 1;
+        }
+        if (layer.blocked[i]) continue;
+        for (const Direction d : kDirections) {
+          const double cells = DistanceToContact(boxes, at, UnitVector(d)) / cell_m;
+          layer.travel[IndexOf(d)][i] = cells < 1e6 ? static_cast<float>(cells) : planner::ContactMap::kUnlimited;
+          if (cells < 1e6) margin = std::min(margin, std::abs(cells - std::round(cells)));
+        }
+      }
+    }
+  }
+  return std::make_shared<planner::ContactMap>(domain, std::vector<planner::ContactMap::Layer>{std::move(layer)}, phase,
+                                               margin);
+}
+
+Task HousingTask() {
+  Task task;
+  task.name = "housing";
+  for (const AxisKind kind : {AxisKind::kX, AxisKind::kY, AxisKind::kZ}) {
+    UncertainAxis axis;
+    axis.kind = kind;
+    task.axes.push_back(axis);
+  }
+  task.start_offset_m = {0.0, 0.0, 0.024};
+  task.insertion_depth_m = 0.020;
+  task.tolerance.lateral_m = 0.001;
+  task.tolerance.vertical_m = 0.002;
+  return task;
+}
+
+std::shared_ptr<const planner::ContactMap> HousingMap() {
+  static const std::shared_ptr<const planner::ContactMap> kMap =
+      MapOf(HousingOverPanel(), 0.002, {0.0, 0.0, 0.5}, {Cell(-24, -20, -18), Cell(24, 20, 3)});
+  return kMap;
+}
+
+KinematicRobot::KinematicRobot(std::vector<Box> boxes, const Task& task, const Pose& world_T_target,
+                               const Pose& world_T_tool, const RobotFaults& faults, RandomStream random)
+    : boxes_(std::move(boxes)),
+      task_(task),
+      world_T_target_(world_T_target),
+      world_T_tool_(world_T_tool),
+      faults_(faults),
+      random_(random) {}
+
+Eigen::Vector3d KinematicRobot::Displacement(const Eigen::Vector3d& world_m) const {
+  return world_T_target_.linear().transpose() * (world_m - world_T_target_.translation());
+}
+
+Pose KinematicRobot::ToolPose() const { return world_T_tool_; }
+
+MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched) {
+  const Eigen::Vector3d from = world_T_tool_.translation();
+  const Eigen::Vector3d motion = to_world_m - from;
+  const double length = motion.norm();
+  MotionResult result;
+  time_s_ += kMotionOverhead + length / speed_m_s;
+  const double weak = random_.Uniform(faults_.weakest_m, faults_.strongest_m);
+  const double slip = random_.Uniform(0.0, faults_.slip_m);
+  Eigen::Vector3d end = to_world_m;
+  if (length > 1e-9) {
+    const Eigen::Vector3d direction = motion / length;
+    const Eigen::Vector3d local = world_T_target_.linear().transpose() * direction;
+    const Eigen::Vector3d at = Displacement(from);
+    double free = Distance(boxes_, at, local, slip);
+    const Eigen::Vector3d wall = at + std::min(free, length) * local;
+    const double lateral = std::max(std::abs(wall.x()), std::abs(wall.y()));
+    if (local.z() < -0.99 && std::abs(wall.z()) < 1e-6) {  // over the opening
+      if (lateral < kClearance) {
+        free += task_.insertion_depth_m;
+      } else if (lateral < kClearance + kChamfer) {
+        free += kClearance + kChamfer - lateral;
+      }
+    }
+    if (free < length) {
+      const double depth = length - free;
+      result.contact = watched && depth > weak;
+      const double late = result.contact ? random_.Uniform(0.0, speed_m_s * faults_.stop_s) : faults_.give * depth;
+      end = from + (free + std::min(late, depth)) * direction;
+      result.peak_force_n = 10.0;
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) end[axis] += Noise(faults_.tracking_m);
+  world_T_tool_.translation() = end;
+  result.reason = result.contact ? StopReason::kContact : StopReason::kReached;
+  result.travelled_m = length > 0.0 ? (end - from).dot(motion) / length : 0.0;
+  result.world_T_tool = world_T_tool_;
+  for (int axis = 0; axis < 3; ++axis) result.world_T_tool.translation()[axis] += Noise(faults_.measurement_m);
+  return result;
+}
+
+MotionResult KinematicRobot::Transfer(const Pose& world_T_tool) { return Go(world_T_tool.translation(), 0.5, false); }
+
+MotionResult KinematicRobot::LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) {
+  return Go(world_T_tool.translation(), speed_m_s, contact_force_n < 1000.0);
+}
+
+MotionResult KinematicRobot::GuardedMove(const GuardedMotion& motion) {
+  return Go(world_T_tool_.translation() + motion.distance_m * motion.direction, motion.speed_m_s, true);
+}
+
+MotionResult KinematicRobot::Compliant(const CompliantMotion& motion) {
+  MotionResult result;
+  const Eigen::Vector3d from = world_T_tool_.translation();
+  const Eigen::Vector3d to = motion.world_T_tool.back().translation();
+  const Eigen::Vector3d at = Displacement(from);
+  Eigen::Vector3d end = Displacement(to);
+  const double lateral = std::max(std::abs(at.x()), std::abs(at.y()));
+  // From above the mouth the chamfer leads a tool in that is at most a chamfer and half the clearance off.
+  if (at.z() >= 0.0 && lateral <= kChamfer + 0.5 * kClearance) {
+    const double bottom = -task_.insertion_depth_m;
+    if (end.z() < bottom) end.z() = bottom;
+    inserted_ = end.z() < bottom + 0.001;
+    end.x() = std::clamp(end.x(), -kClearance, kClearance);
+    end.y() = std::clamp(end.y(), -kClearance, kClearance);
+  } else if (end.z() < 0.0 && at.z() >= 0.0) {
+    end.z() = 0.0;
+    result.reason = StopReason::kForceLimit;
+    result.contact = true;
+  }
+  time_s_ += kMotionOverhead + (to - from).norm() / motion.speed_m_s;
+  world_T_tool_.translation() = world_T_target_ * end;
+  result.travelled_m = (world_T_tool_.translation() - from).norm();
+  result.world_T_tool = world_T_tool_;
+  return result;
+}
+
+}  // namespace feeler::execution
