@@ -61,6 +61,11 @@ auto Guarded(const std::string& path, const Body& body) {
   }
 }
 
+std::int64_t FileSize(const std::string& path) {
+  struct stat status {};
+  return stat(path.c_str(), &status) == 0 ? std::int64_t{status.st_size} : 0;
+}
+
 void RequireReadableFile(const std::string& path) {
   struct stat status {};
   if (path.empty() || stat(path.c_str(), &status) != 0) throw InputError(path, "no such file", kMakeOne);
@@ -100,8 +105,8 @@ void CheckHeader(const SqliteConnection& connection, const std::string& path) {
   const std::uint32_t stored_page_size = BigEndian(header, 16, 2);
   const std::int64_t page_size = stored_page_size == 1 ? 65536 : stored_page_size;
   const std::int64_t expected = page_size * BigEndian(header, 28, 4);
-  if (connection.FileSize() < expected) {
-    throw Damaged(path, fmt::format("it is cut off ({} of {} bytes)", connection.FileSize(), expected));
+  if (FileSize(path) < expected) {
+    throw Damaged(path, fmt::format("it is cut off ({} of {} bytes)", FileSize(path), expected));
   }
 }
 
@@ -286,7 +291,7 @@ struct Database::State {
     SqliteTransaction transaction(*connection, SqliteTransaction::Kind::kRead);
     // The first read undoes what a killed writer left behind; only then are header and tables what was committed.
     const std::int64_t objects = connection->QueryInteger("SELECT count(*) FROM sqlite_schema");
-    if (objects == 0 && connection->FileSize() == 0) throw InputError(path, "is empty", kMakeOne);
+    if (objects == 0 && FileSize(path) == 0) throw InputError(path, "is empty", kMakeOne);
     CheckHeader(*connection, path);
     CheckSchema(*connection, path);
     meta = ReadMeta(*connection, path);
@@ -380,8 +385,9 @@ Database Database::OpenOrCreate(const std::string& path, const DatabaseIdentity&
     Guarded(path, [&] {
       state->connection = std::make_unique<SqliteConnection>(path, true);
       CheckMode(*state->connection, path);
-      const bool fresh = state->connection->QueryInteger("SELECT count(*) FROM sqlite_schema") == 0 &&
-                         state->connection->FileSize() == 0;
+      // SQLite takes a file shorter than a page for an empty one; only a truly empty one is ours to fill.
+      const bool fresh =
+          state->connection->QueryInteger("SELECT count(*) FROM sqlite_schema") == 0 && FileSize(path) == 0;
       if (fresh) {
         state->Initialise(identity);
       } else {
@@ -529,7 +535,7 @@ DatabaseInfo Database::Info() {
     info.expected_cost_mean = cost_sum / static_cast<double>(info.solved);
   }
   const std::lock_guard guard(state_->mutex);
-  info.bytes = Guarded(state_->path, [&] { return state_->connection->FileSize(); });
+  info.bytes = FileSize(state_->path);
   return info;
 }
 

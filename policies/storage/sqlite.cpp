@@ -61,14 +61,6 @@ std::array<unsigned char, SqliteConnection::kHeaderSize> SqliteConnection::ReadH
   return header;
 }
 
-std::int64_t SqliteConnection::FileSize() const {
-  sqlite3_int64 size = 0;
-  sqlite3_file* file = FileOf(handle_);
-  const int code = file->pMethods->xFileSize(file, &size);
-  if (code != SQLITE_OK) throw SqliteFailure(code, sqlite3_errstr(code));
-  return size;
-}
-
 SqliteStatement::SqliteStatement(const SqliteConnection& connection, const char* sql)
     : connection_(connection.handle()) {
   Check(sqlite3_prepare_v2(connection_, sql, -1, &statement_, nullptr));

@@ -38,7 +38,6 @@ class SqliteConnection {
   /// The first 100 bytes, read through SQLite's own descriptor (closing another one would drop its locks); fewer bytes
   /// in the file read as zeros.
   std::array<unsigned char, kHeaderSize> ReadHeader() const;
-  std::int64_t FileSize() const;
   sqlite3* handle() const { return handle_; }
 
  private:
