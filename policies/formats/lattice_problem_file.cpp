@@ -21,6 +21,8 @@ constexpr int kMaxCoordinate = 1 << 16;
 constexpr int kMaxMoveLength = 1024;
 constexpr std::int64_t kMaxDisplacements = std::int64_t{1} << 26;
 constexpr std::size_t kMaxCells = std::size_t{1} << 22;
+/// Pairs of tool and target cell, each of which blocks a displacement.
+constexpr std::size_t kMaxCellPairs = std::size_t{1} << 30;
 constexpr std::size_t kMaxHypotheses = std::size_t{1} << 20;
 /// Pairs of tool cell and hypothesis up to which a blocked start is looked for here (the planner looks again).
 constexpr std::size_t kMaxStartChecks = std::size_t{1} << 27;
@@ -147,6 +149,9 @@ LatticeProblemData ParseLatticeProblem(std::string_view text, const std::string&
   data.start = document["start"].AsCell(0, kMaxSize);
   data.tool = ReadCells(document["tool"]);
   data.target = ReadCells(document["target"]);
+  if (data.tool.size() > kMaxCellPairs / data.target.size()) {
+    document["tool"].Fail("and target have too many cells together", "use larger cells, or the surface cells only");
+  }
   data.hypotheses = ReadHypotheses(document["hypotheses"]);
   if (document.Has("move_lengths")) data.move_lengths = ReadMoveLengths(document["move_lengths"]);
   if (document.Has("cost")) data.cost = ReadCost(document["cost"]);

@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include "core/error.h"
@@ -80,13 +82,16 @@ std::uint32_t BigEndian(const std::array<unsigned char, SqliteConnection::kHeade
   return value;
 }
 
-/// What must hold before SQLite is let near the file: a file in write-ahead mode would grow side files when read.
-void CheckMode(const SqliteConnection& connection, const std::string& path) {
-  const auto header = connection.ReadHeader();
-  const bool sqlite = std::equal(header.begin(), header.begin() + 16, "SQLite format 3");
-  if (sqlite && BigEndian(header, 18, 2) != 0x0101) {
-    throw InputError(path, "the database is damaged or was switched to write-ahead logging",
-                     "in sqlite3, run PRAGMA journal_mode=DELETE on it, or restore it from a copy");
+/// The pages that the header counts must be there, unless a log beside the file is being folded into it just now.
+void CheckLength(const SqliteConnection& connection, const std::string& path) {
+  for (int attempt = 0;; ++attempt) {
+    const auto header = connection.ReadHeader();
+    const std::uint32_t page_size = BigEndian(header, 16, 2);
+    const std::int64_t expected = std::int64_t{page_size == 1 ? 65536 : page_size} * BigEndian(header, 28, 4);
+    const std::int64_t size = FileSize(path);
+    if (size >= expected || FileSize(path + "-wal") > 0) return;
+    if (attempt == 3) throw Damaged(path, fmt::format("it is cut off ({} of {} bytes)", size, expected));
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
 }
 
@@ -102,12 +107,7 @@ void CheckHeader(const SqliteConnection& connection, const std::string& path) {
         path, fmt::format("is a database of version {}, this feeler reads version {}", version, Database::kVersion),
         "use the version of feeler that wrote it");
   }
-  const std::uint32_t stored_page_size = BigEndian(header, 16, 2);
-  const std::int64_t page_size = stored_page_size == 1 ? 65536 : stored_page_size;
-  const std::int64_t expected = page_size * BigEndian(header, 28, 4);
-  if (FileSize(path) < expected) {
-    throw Damaged(path, fmt::format("it is cut off ({} of {} bytes)", FileSize(path), expected));
-  }
+  CheckLength(connection, path);
 }
 
 void CheckSchema(const SqliteConnection& connection, const std::string& path) {
@@ -267,6 +267,11 @@ struct Database::State {
   std::string verified_checksum;  // meta checksum at the last Verify: a miss is a true one while it stands
   std::mutex mutex;
 
+  ~State() {
+    select_one.reset();
+    if (lock && connection) connection->Settle();
+  }
+
   void RequireWriter() const {
     if (!lock) throw std::logic_error("Database::Put: the database is open for reading");
   }
@@ -287,7 +292,6 @@ struct Database::State {
   }
 
   void Load() {
-    CheckMode(*connection, path);
     SqliteTransaction transaction(*connection, SqliteTransaction::Kind::kRead);
     // The first read undoes what a killed writer left behind; only then are header and tables what was committed.
     const std::int64_t objects = connection->QueryInteger("SELECT count(*) FROM sqlite_schema");
@@ -384,7 +388,6 @@ Database Database::OpenOrCreate(const std::string& path, const DatabaseIdentity&
   try {
     Guarded(path, [&] {
       state->connection = std::make_unique<SqliteConnection>(path, true);
-      CheckMode(*state->connection, path);
       // SQLite takes a file shorter than a page for an empty one; only a truly empty one is ours to fill.
       const bool fresh =
           state->connection->QueryInteger("SELECT count(*) FROM sqlite_schema") == 0 && FileSize(path) == 0;
@@ -395,6 +398,7 @@ Database Database::OpenOrCreate(const std::string& path, const DatabaseIdentity&
         RequireSameIdentity(state->meta, identity, path);
         state->VerifyAll();
       }
+      state->connection->Execute("PRAGMA journal_mode=WAL");
     });
   } catch (...) {
     state->connection.reset();

@@ -69,10 +69,10 @@ struct DatabaseInfo {
 
 /// The policies of a problem family for one task, in one SQLite file (layout: docs/file-formats.md).
 ///
-/// Laws: a problem is on disk, whole, when Put returns, and a process killed at any moment loses only the problem in
-/// flight; Get returns what was Put, doubles bit for bit, or throws: an altered byte never yields another policy; one
-/// writer at a time, readers beside it; no side files once closed. All operations throw InputError (file, what, how to
-/// mend) for anything wrong with the file.
+/// Laws: a process killed at any moment loses only the problem in flight (a power cut: those of the last moments; the
+/// file stays whole); Get returns what was Put, doubles bit for bit, or throws: an altered byte never yields another
+/// policy; one writer at a time, readers beside it; no side files once closed. All operations throw InputError (file,
+/// what, how to mend) for anything wrong with the file.
 ///
 /// A Database may be used from several threads; calls are serialized.
 class Database {

@@ -1,10 +1,32 @@
 #include "policies/storage/sqlite.h"
 
+#include <sys/stat.h>
+
 namespace feeler::policies {
 namespace {
 
 constexpr int kBusyTimeoutMs = 10'000;
+constexpr int kSettleTimeoutMs = 100;
 constexpr int kMaxValueBytes = 1 << 27;
+
+/// True if a log stands beside the file that holds what the file lacks.
+bool HasLog(const std::string& path) {
+  struct stat status {};
+  return stat((path + "-wal").c_str(), &status) == 0 && status.st_size > 0;
+}
+
+std::string EscapeUri(const std::string& path) {
+  std::string escaped;
+  for (const char c : path) {
+    if (c == '%' || c == '?' || c == '#') {
+      constexpr char kDigits[] = "0123456789ABCDEF";
+      escaped += {'%', kDigits[static_cast<unsigned char>(c) >> 4], kDigits[c & 15]};
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
 
 sqlite3_file* FileOf(sqlite3* handle) {
   sqlite3_file* file = nullptr;
@@ -20,27 +42,47 @@ sqlite3_file* FileOf(sqlite3* handle) {
 SqliteConnection::SqliteConnection(const std::string& path, bool writable) {
   // Names such as ":memory:" mean something else to SQLite.
   const std::string name = !path.empty() && path.front() == ':' ? "./" + path : path;
-  const int code = sqlite3_open_v2(name.c_str(), &handle_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
-  if (code != SQLITE_OK) {
-    const std::string message = handle_ != nullptr ? sqlite3_errmsg(handle_) : "out of memory";
-    sqlite3_close(handle_);
-    throw SqliteFailure(code, message);
-  }
-  sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
-  // The file may come from anywhere: no code hidden in its schema runs, and no length in it is believed.
-  sqlite3_db_config(handle_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  sqlite3_db_config(handle_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  sqlite3_limit(handle_, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
   try {
-    Execute(writable ? "PRAGMA cell_size_check=ON; PRAGMA secure_delete=ON; PRAGMA synchronous=NORMAL"
-                     : "PRAGMA cell_size_check=ON; PRAGMA query_only=ON");
+    Open(name, SQLITE_OPEN_READWRITE);
+    Configure(writable);
+    try {
+      QueryInteger("SELECT count(*) FROM sqlite_schema");
+    } catch (const SqliteFailure& failure) {
+      const bool blocked = failure.code == SQLITE_CANTOPEN || failure.code == SQLITE_READONLY;
+      if (writable || !blocked || HasLog(path)) throw;
+      // In write-ahead mode, closed cleanly, on a medium where no log can be made: nothing can change, read it so.
+      sqlite3_close(handle_);
+      handle_ = nullptr;
+      Open("file:" + EscapeUri(name) + "?immutable=1", SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+      Configure(writable);
+    }
   } catch (const SqliteFailure&) {
     sqlite3_close(handle_);
     throw;
   }
 }
 
+void SqliteConnection::Open(const std::string& name, int flags) {
+  const int code = sqlite3_open_v2(name.c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  if (code != SQLITE_OK) throw SqliteFailure(code, handle_ != nullptr ? sqlite3_errmsg(handle_) : "out of memory");
+}
+
+void SqliteConnection::Configure(bool writable) {
+  sqlite3_busy_timeout(handle_, kBusyTimeoutMs);
+  // The file may come from anywhere: no code hidden in its schema runs, and no length in it is believed.
+  sqlite3_db_config(handle_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_limit(handle_, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
+  Execute(writable ? "PRAGMA cell_size_check=ON; PRAGMA secure_delete=ON; PRAGMA synchronous=NORMAL"
+                   : "PRAGMA cell_size_check=ON; PRAGMA query_only=ON");
+}
+
 SqliteConnection::~SqliteConnection() { sqlite3_close(handle_); }
+
+void SqliteConnection::Settle() {
+  sqlite3_busy_timeout(handle_, kSettleTimeoutMs);
+  sqlite3_exec(handle_, "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE", nullptr, nullptr, nullptr);
+}
 
 void SqliteConnection::Execute(const char* sql) {
   const int code = sqlite3_exec(handle_, sql, nullptr, nullptr, nullptr);

@@ -22,13 +22,17 @@ class SqliteFailure : public std::runtime_error {
 /// A connection to one database file. Not thread-safe.
 class SqliteConnection {
  public:
-  /// Opens an existing file; `writable` false still lets SQLite undo a write that was killed, where the file permits.
-  /// Throws SqliteFailure.
+  /// Opens an existing file. A writer logs ahead (no wait for the disk at each commit, yet consistent whatever
+  /// happens); a reader still lets SQLite finish what a killed writer logged, where the folder permits, and reads a
+  /// file without a log where nothing can be written. Throws SqliteFailure.
   SqliteConnection(const std::string& path, bool writable);
   ~SqliteConnection();
   SqliteConnection(const SqliteConnection&) = delete;
   SqliteConnection& operator=(const SqliteConnection&) = delete;
 
+  /// Folds the log back into the file and leaves write-ahead mode, so that the file stands alone. Left to a later
+  /// writer if readers are about.
+  void Settle();
   /// Runs statements that return nothing of interest. Throws SqliteFailure.
   void Execute(const char* sql);
   /// First column of the first row. Throws SqliteFailure if there is none.
@@ -41,6 +45,9 @@ class SqliteConnection {
   sqlite3* handle() const { return handle_; }
 
  private:
+  void Open(const std::string& name, int flags);
+  void Configure(bool writable);
+
   sqlite3* handle_ = nullptr;
 };
 
