@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <numbers>
 #include <string_view>
 
 #include "core/error.h"
@@ -95,15 +94,15 @@ void CheckGeometry(const TaskModel& task_model, const std::string& where) {
 
   const double just_inside_m = std::min(5e-5, task.insertion_depth_m / 10);
   const int axis = AxisOf(task.insertion);
-  for (int k = 0; k < 8; ++k) {
-    const double angle = k * std::numbers::pi / 4;
+  for (int k = 0; k < 9; ++k) {
     Eigen::Vector3d lateral_m = Eigen::Vector3d::Zero();
-    lateral_m[(axis + 1) % 3] = task.tolerance.lateral_m * std::cos(angle);
-    lateral_m[(axis + 2) % 3] = task.tolerance.lateral_m * std::sin(angle);
+    lateral_m[(axis + 1) % 3] = task.tolerance.lateral_m * (k % 3 - 1);
+    lateral_m[(axis + 2) % 3] = task.tolerance.lateral_m * (k / 3 - 1);
     if (open.Overlap(lateral_m + inward * just_inside_m)) {
-      throw InputError(numeric("feeler_tolerance_lateral"),
-                       fmt::format("a tool displaced by {} m misses the opening", task.tolerance.lateral_m),
-                       "the tolerance is at most the clearance and the lead-in chamfer");
+      throw InputError(
+          numeric("feeler_tolerance_lateral"),
+          fmt::format("a tool displaced by {} m along each axis misses the opening", task.tolerance.lateral_m),
+          "the tolerance is at most the clearance and the lead-in chamfer");
     }
   }
 

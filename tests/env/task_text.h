@@ -1,0 +1,48 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace feeler::env {
+
+/// A task file as text, made from its custom fields and the contents of its bodies. The default is a square peg over a
+/// plate with a square hole: the smallest task that is complete.
+struct TaskText {
+  std::map<std::string, std::string> texts = {
+      {"feeler_axes", "x y z"}, {"feeler_insertion_axis", "-z"}, {"feeler_goal", "singleton"}};
+  std::map<std::string, std::string> numbers = {{"feeler_resolution", "0.002 0.002 0.002"},
+                                                {"feeler_min_cells", "2 2 2"},
+                                                {"feeler_max_cells", "5 5 5"},
+                                                {"feeler_start_offset", "0 0 0.02"},
+                                                {"feeler_workspace", "0.02 0.02 0.02"},
+                                                {"feeler_move_lengths", "1 2 4"},
+                                                {"feeler_insertion_depth", "0.01"},
+                                                {"feeler_tolerance_lateral", "0.0005"},
+                                                {"feeler_tolerance_vertical", "0.002"},
+                                                {"feeler_tolerance_angle", "0.03"},
+                                                {"feeler_cost", "1 0 0"},
+                                                {"feeler_flange_position", "0 0 0.1"},
+                                                {"feeler_flange_quaternion", "0 1 0 0"}};
+  std::string tool = R"(<geom name="peg" type="box" size="0.004 0.004 0.015" pos="0 0 0.015"/>)";
+  std::string target = R"(
+      <geom name="west" type="box" size="0.01 0.03 0.01" pos="-0.015 0 -0.01"/>
+      <geom name="east" type="box" size="0.01 0.03 0.01" pos="0.015 0 -0.01"/>
+      <geom name="south" type="box" size="0.01 0.01 0.01" pos="0 -0.015 -0.01"/>
+      <geom name="north" type="box" size="0.01 0.01 0.01" pos="0 0.015 -0.01"/>
+      <geom name="lid" type="box" size="0.005 0.005 0.01" pos="0 0 -0.01" contype="0" conaffinity="0"/>)";
+  std::string tool_body = R"(<body name="tool" pos="0.6 0 0.3">)";
+  std::string target_body = R"(<body name="target" pos="0.6 0 0.2">)";
+  std::string extra;  ///< children of <mujoco>
+
+  std::string Mjcf() const {
+    std::string mjcf = "<mujoco>\n<custom>\n";
+    for (const auto& [name, value] : texts) mjcf += "<text name=\"" + name + "\" data=\"" + value + "\"/>\n";
+    for (const auto& [name, value] : numbers) mjcf += "<numeric name=\"" + name + "\" data=\"" + value + "\"/>\n";
+    mjcf += "</custom>\n" + extra + "\n<worldbody>\n";
+    if (!tool_body.empty()) mjcf += tool_body + tool + "</body>\n";
+    if (!target_body.empty()) mjcf += target_body + target + "</body>\n";
+    return mjcf + "</worldbody>\n</mujoco>\n";
+  }
+};
+
+}  // namespace feeler::env
