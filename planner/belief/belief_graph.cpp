@@ -6,38 +6,26 @@
 namespace feeler::planner {
 
 BeliefGraph::BeliefGraph(const Problem& problem, const ContactMasks& masks, bool canonical)
-    : problem_(problem), masks_(masks), sets_(problem), canonical_(canonical && sets_.shiftable()) {
+    : problem_(problem), masks_(masks), sets_(problem, canonical) {
   table_.assign(1024, kNoBelief);
-}
-
-std::uint64_t BeliefGraph::Hash(SetId set, const Key& robot, const Key& frame) {
-  const auto pack = [](const Key& k) {
-    return std::uint64_t{static_cast<std::uint16_t>(k.x)} | std::uint64_t{static_cast<std::uint16_t>(k.y)} << 16 |
-           std::uint64_t{static_cast<std::uint16_t>(k.z)} << 32;
-  };
-  std::uint64_t hash = (pack(robot) ^ std::uint64_t{set} << 32 ^ set) * 0xFF51AFD7ED558CCD;
-  hash = (hash ^ hash >> 32 ^ pack(frame)) * 0xC4CEB9FE1A85EC53;
-  return hash ^ hash >> 29;
 }
 
 BeliefId BeliefGraph::Start() {
   if (sets_.info(sets_.start()).goal) return kNoBelief;
-  const Cell frame = sets_.start_frame();
-  return Intern(sets_.start(), problem_.start - frame, canonical_ ? Cell(Cell::Zero()) : frame);
+  return Intern(sets_.start(), problem_.start - sets_.start_frame());
 }
 
-BeliefId BeliefGraph::Intern(SetId set, const Cell& robot, const Cell& frame) {
-  const Key robot_key = ToKey(robot);
-  const Key frame_key = ToKey(frame);
+BeliefId BeliefGraph::Intern(SetId set, const Cell& robot) {
+  const std::uint64_t packed = Pack(robot);
   const std::size_t mask = table_.size() - 1;
-  std::size_t at = Hash(set, robot_key, frame_key) & mask;
+  std::size_t at = Hash(set, packed) & mask;
   for (; table_[at] != kNoBelief; at = (at + 1) & mask) {
     const Belief& known = beliefs_[table_[at]];
-    if (known.set == set && known.robot == robot_key && known.frame == frame_key) return table_[at];
+    if (known.set == set && known.robot == packed) return table_[at];
   }
   const auto b = static_cast<BeliefId>(beliefs_.size());
-  Belief belief{set, robot_key, frame_key, kUnexpanded, 0, 0.0};
-  if (heuristic_ != nullptr) belief.heuristic = heuristic_->Weighted(set, robot, frame);
+  Belief belief{packed, set, kUnexpanded, 0, 0.0};
+  if (heuristic_ != nullptr) belief.heuristic = heuristic_->Weighted(set, robot);
   beliefs_.push_back(belief);
   table_[at] = b;
   if (beliefs_.size() * 2 > table_.size()) Grow();
@@ -48,7 +36,7 @@ void BeliefGraph::Grow() {
   std::vector<BeliefId> table(table_.size() * 2, kNoBelief);
   const std::size_t mask = table.size() - 1;
   for (BeliefId b = 0; b < beliefs_.size(); ++b) {
-    std::size_t at = Hash(beliefs_[b].set, beliefs_[b].robot, beliefs_[b].frame) & mask;
+    std::size_t at = Hash(beliefs_[b].set, beliefs_[b].robot) & mask;
     while (table[at] != kNoBelief) at = (at + 1) & mask;
     table[at] = b;
   }
@@ -56,10 +44,9 @@ void BeliefGraph::Grow() {
 }
 
 int BeliefGraph::LongestApplicable(BeliefId b, Direction d) const {
-  if (canonical_) return problem_.move_lengths.back();
+  if (canonical()) return problem_.move_lengths.back();
   const int axis = AxisOf(d);
-  const int here = beliefs_[b].robot.x * (axis == 0) + beliefs_[b].robot.y * (axis == 1) +
-                   beliefs_[b].robot.z * (axis == 2) + ToCell(beliefs_[b].frame)[axis];
+  const int here = robot(b)[axis];
   const int room = SignOf(d) > 0 ? problem_.workspace.max[axis] - here : here - problem_.workspace.min[axis];
   int longest = 0;
   for (const int length : problem_.move_lengths) {
@@ -125,7 +112,6 @@ void BeliefGraph::Expand(BeliefId b) {
   const auto first_action = static_cast<std::uint32_t>(actions_.size());
   const SetId here = beliefs_[b].set;
   const Cell robot_here = robot(b);
-  const Cell frame_here = frame(b);
   const CostWeights& cost = problem_.cost;
   for (const Direction d : kDirections) {
     const int longest = LongestApplicable(b, d);
@@ -135,7 +121,7 @@ void BeliefGraph::Expand(BeliefId b) {
     double contact_cost = 0.0;
     const auto successor = [&](int cells, SetId set, const Cell& shift) {
       if (sets_.info(set).goal) return kNoBelief;
-      return Intern(set, robot_here + cells * step - shift, canonical_ ? frame_here : Cell(frame_here + shift));
+      return Intern(set, robot_here + cells * step - shift);
     };
     bool only_bump = false;
     Walk(
@@ -178,12 +164,11 @@ void BeliefGraph::Expand(BeliefId b) {
 std::vector<BeliefOutcome> BeliefGraph::Outcomes(BeliefId b, const GuardedMove& move) {
   std::vector<BeliefOutcome> outcomes;
   const Cell robot_here = robot(b);
-  const Cell frame_here = frame(b);
   const Cell step = UnitCell(move.direction);
   const auto add = [&](int cells, bool contact, SetId set, const Cell& shift) {
     BeliefOutcome outcome{{cells, contact}, kNoBelief, set, shift, sets_.info(set).weight};
     if (!sets_.info(set).goal) {
-      outcome.next = Intern(set, robot_here + cells * step - shift, canonical_ ? frame_here : Cell(frame_here + shift));
+      outcome.next = Intern(set, robot_here + cells * step - shift);
     }
     outcomes.push_back(outcome);
   };

@@ -39,9 +39,9 @@ struct BeliefOutcome {
 /// The belief MDP of a problem, grown on demand: beliefs (robot cell, set of hypotheses) with their actions, successors
 /// and heuristic values, each stored once. The model that the solvers work on (see solver/belief_model.h).
 ///
-/// Frames: contact depends on r - h alone, so robot cells are kept relative to the frame of the set. With `canonical`
-/// translates are one belief, and the workspace is taken to be unbounded (see Problem::generous_workspace); without, a
-/// belief knows its frame, and moves are confined to the workspace.
+/// With `canonical`, translates are one belief: contact depends on r - h alone, so robot cells are relative to the
+/// frame of the set, and the workspace is taken to be unbounded (see Problem::generous_workspace). Without, all
+/// coordinates are the problem's and moves are confined to the workspace.
 class BeliefGraph {
  public:
   /// `heuristic` may be null (all zero). `canonical` is ignored where hypothesis sets are not shiftable.
@@ -51,7 +51,7 @@ class BeliefGraph {
   const Problem& problem() const { return problem_; }
   HypothesisSets& sets() { return sets_; }
   const HypothesisSets& sets() const { return sets_; }
-  bool canonical() const { return canonical_; }
+  bool canonical() const { return sets_.shiftable(); }
 
   /// The start belief; kNoBelief if it is a goal already. Needs the heuristic.
   BeliefId Start();
@@ -73,32 +73,36 @@ class BeliefGraph {
   }
 
   SetId set(BeliefId b) const { return beliefs_[b].set; }
-  Cell robot(BeliefId b) const { return ToCell(beliefs_[b].robot); }  ///< relative to the frame
-  Cell frame(BeliefId b) const { return ToCell(beliefs_[b].frame); }  ///< zero if canonical
+  Cell robot(BeliefId b) const { return Unpack(beliefs_[b].robot); }  ///< relative to the frame
   /// All outcomes of a move, goals included.
   std::vector<BeliefOutcome> Outcomes(BeliefId b, const GuardedMove& move);
   /// The belief of a set with the robot at a cell relative to its frame.
-  BeliefId Intern(SetId set, const Cell& robot, const Cell& frame);
+  BeliefId Intern(SetId set, const Cell& robot);
   std::size_t bytes() const;
 
  private:
   static constexpr std::uint32_t kUnexpanded = ~std::uint32_t{0};
-  struct Key {
-    std::int16_t x = 0, y = 0, z = 0;
-    bool operator==(const Key&) const = default;
-  };
   struct Belief {
+    std::uint64_t robot = 0;  ///< packed cell
     SetId set = 0;
-    Key robot, frame;
     std::uint32_t first_action = kUnexpanded;
     std::uint32_t action_count = 0;
     double heuristic = 0.0;
   };
-  static Cell ToCell(const Key& k) { return {k.x, k.y, k.z}; }
-  static Key ToKey(const Cell& c) {
-    return {static_cast<std::int16_t>(c.x()), static_cast<std::int16_t>(c.y()), static_cast<std::int16_t>(c.z())};
+  /// 21 bits a coordinate.
+  static std::uint64_t Pack(const Cell& c) {
+    const auto bits = [](int x) { return static_cast<std::uint64_t>(x + (1 << 20)); };
+    return bits(c.x()) | bits(c.y()) << 21 | bits(c.z()) << 42;
   }
-  static std::uint64_t Hash(SetId set, const Key& robot, const Key& frame);
+  static Cell Unpack(std::uint64_t packed) {
+    const auto coordinate = [](std::uint64_t bits) { return static_cast<int>(bits & 0x1FFFFF) - (1 << 20); };
+    return {coordinate(packed), coordinate(packed >> 21), coordinate(packed >> 42)};
+  }
+  static std::uint64_t Hash(SetId set, std::uint64_t robot) {
+    std::uint64_t hash = (robot ^ std::uint64_t{set} << 40 ^ set) * 0xFF51AFD7ED558CCD;
+    hash = (hash ^ hash >> 32) * 0xC4CEB9FE1A85EC53;
+    return hash ^ hash >> 29;
+  }
 
   void Expand(BeliefId b);
   /// Walks a belief in one direction, splitting it where steps are blocked. Calls on_contact(cells, set, shift) for
@@ -113,7 +117,6 @@ class BeliefGraph {
   const ContactMasks& masks_;
   HypothesisSets sets_;
   BeliefHeuristic* heuristic_ = nullptr;
-  bool canonical_ = false;
   std::vector<Belief> beliefs_;
   std::vector<BeliefAction> actions_;
   std::vector<BeliefId> contacts_;

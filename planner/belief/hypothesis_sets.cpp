@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <map>
 
 namespace feeler::planner {
@@ -38,7 +39,7 @@ void UsedColumnsAndRows(const Bits256& bits, unsigned& columns, unsigned& rows) 
 
 }  // namespace
 
-HypothesisSets::HypothesisSets(const Problem& problem)
+HypothesisSets::HypothesisSets(const Problem& problem, bool canonical)
     : goal_(problem.goal), insertable_spread_(problem.insertable_spread) {
   Cell low = problem.hypotheses.front().offset;
   Cell high = low;
@@ -53,7 +54,7 @@ HypothesisSets::HypothesisSets(const Problem& problem)
     uniform = uniform && h.weight == problem.hypotheses.front().weight;
   }
   const Cell span = high - low + Cell::Ones();
-  shiftable_ = uniform && span.x() <= kWindow && span.y() <= kWindow && span.z() <= 4096;
+  shiftable_ = canonical && uniform && span.x() <= kWindow && span.y() <= kWindow && span.z() <= 4096;
 
   // Layers: by orientation, then tile (one where sets are shiftable), then height.
   std::map<std::array<int, 4>, std::vector<std::size_t>> members;  // orientation, tile x, tile y, z
@@ -93,6 +94,9 @@ HypothesisSets::HypothesisSets(const Problem& problem)
       }
     }
     slabs.push_back(slab);
+  }
+  for (const Cell& corner : corners_) {
+    single_window_ = single_window_ && corner.head<2>() == corners_.front().head<2>();
   }
   table_.assign(256, kEmpty);
   Cell shift;
@@ -173,6 +177,29 @@ SetId HypothesisSets::Intern(std::vector<Slab>& given, Cell& shift) {
   table_[at] = set;
   if (infos_.size() * 2 > table_.size()) Grow();
   return set;
+}
+
+std::optional<SetId> HypothesisSets::Find(const std::vector<Hypothesis>& hypotheses) {
+  assert(!shiftable_);
+  std::vector<Slab> found;
+  for (const Slab& slab : slabs(start_)) {
+    const Cell corner = Corner(slab.layer);
+    Slab part{slab.layer, {}};
+    for (const Hypothesis& h : hypotheses) {
+      const Cell in = h.offset - corner;
+      if (h.orientation != Orientation(slab.layer) || in.z() != 0 || in.x() < 0 || in.x() >= kWindow || in.y() < 0 ||
+          in.y() >= kWindow) {
+        continue;
+      }
+      if (slab.bits.Test(in.x() + kWindow * in.y())) part.bits.Set(in.x() + kWindow * in.y());
+    }
+    if (part.bits.Any()) found.push_back(part);
+  }
+  std::size_t size = 0;
+  for (const Slab& slab : found) size += static_cast<std::size_t>(slab.bits.Count());
+  if (size != hypotheses.size() || size == 0) return std::nullopt;
+  Cell shift;
+  return Intern(found, shift);
 }
 
 bool HypothesisSets::IsSubset(SetId part, SetId whole, const Cell& by) const {

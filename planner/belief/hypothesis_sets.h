@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,9 +22,9 @@ struct Slab {
 
 /// Hash-consed sets of hypotheses: equal sets have equal ids. A set is a sorted list of non-empty slabs.
 ///
-/// Where the hypotheses of the problem span at most 16 cells along x and y and weigh the same, a set is stored relative
+/// Canonical, and where the hypotheses span at most 16 cells along x and y and weigh the same, a set is stored relative
 /// to its own least corner (its frame), so that translates of each other are one set; `shiftable()` tells. Otherwise
-/// all frames are zero.
+/// offsets are the problem's and all frames are zero.
 class HypothesisSets {
  public:
   struct Info {
@@ -36,9 +37,12 @@ class HypothesisSets {
     Cell high = Cell::Zero();
   };
 
-  explicit HypothesisSets(const Problem& problem);
+  /// `canonical`: store sets relative to their frames where that is possible.
+  HypothesisSets(const Problem& problem, bool canonical);
 
   bool shiftable() const { return shiftable_; }
+  /// All layers look at the same window of x and y.
+  bool single_window() const { return single_window_; }
   /// All hypotheses weigh the same.
   bool uniform() const { return weights_.empty(); }
   /// The start belief's set, and its frame in problem coordinates.
@@ -58,6 +62,10 @@ class HypothesisSets {
   /// The id of a non-empty set given by non-empty slabs in increasing order of layers, and by how much its frame is
   /// shifted from the one the slabs are given in. `slabs` is overwritten.
   SetId Intern(std::vector<Slab>& slabs, Cell& shift);
+
+  /// The set of these hypotheses, in problem coordinates; empty unless all are hypotheses of the problem. Not for
+  /// shiftable sets.
+  std::optional<SetId> Find(const std::vector<Hypothesis>& hypotheses);
 
   /// Is `part` shifted by `by` a subset of `whole`? Both relative to their frames.
   bool IsSubset(SetId part, SetId whole, const Cell& by) const;
@@ -82,6 +90,7 @@ class HypothesisSets {
   void Grow();
 
   bool shiftable_ = false;
+  bool single_window_ = true;
   int depth_ = 1;  ///< layers per orientation where sets are shiftable
   GoalKind goal_;
   Cell insertable_spread_;

@@ -58,6 +58,9 @@ void Validate(const Problem& problem) {
       throw InputError(where, fmt::format("move length {} out of place", length), "lengths increase, from 1 to 1024");
     }
   }
+  if (problem.move_lengths.front() != 1) {
+    throw InputError(where, "no move of one cell", "list the length 1, so that every move can be taken back");
+  }
   for (const double cost : {problem.cost.per_cell, problem.cost.per_contact, problem.cost.per_action}) {
     if (!std::isfinite(cost) || cost < 0.0) {
       throw InputError(where, fmt::format("cost {}", cost), "costs are finite and not negative");

@@ -38,8 +38,8 @@ struct Problem {
 };
 
 /// Throws InputError unless: there is a map and at least one hypothesis; hypotheses are distinct, with finite positive
-/// weights and orientations the map has; move lengths are >= 1, increasing, at most 1024; costs are finite and >= 0 and
-/// a move is never free (per_cell + per_action > 0); the start lies in the workspace and is blocked under no
+/// weights and orientations the map has; move lengths start with 1, increase, at most 1024; costs are finite and >= 0
+/// and a move is never free (per_cell + per_action > 0); the start lies in the workspace and is blocked under no
 /// hypothesis.
 void Validate(const Problem& problem);
 

@@ -13,8 +13,8 @@ namespace feeler::planner {
 class BeliefHeuristic {
  public:
   virtual ~BeliefHeuristic() = default;
-  /// `robot` is relative to the set's frame; `frame` in problem coordinates (zero where translates are one belief).
-  virtual double Weighted(SetId set, const Cell& robot, const Cell& frame) = 0;
+  /// `robot` is relative to the set's frame.
+  virtual double Weighted(SetId set, const Cell& robot) = 0;
 };
 
 }  // namespace feeler::planner

@@ -34,8 +34,7 @@ const CertificateHeuristic::Terms& CertificateHeuristic::Prepare(SetId set) {
   return terms;
 }
 
-double CertificateHeuristic::Weighted(SetId set, const Cell& robot, const Cell& frame) {
-  static_cast<void>(frame);  // depends on displacements alone
+double CertificateHeuristic::Weighted(SetId set, const Cell& robot) {
   const HypothesisSets::Info& info = sets_.info(set);
   if (info.goal) return 0.0;
   const CellBox& domain = table_->domain();

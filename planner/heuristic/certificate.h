@@ -14,7 +14,7 @@ namespace feeler::planner {
 class CertificateHeuristic final : public BeliefHeuristic {
  public:
   CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table);
-  double Weighted(SetId set, const Cell& robot, const Cell& frame) override;
+  double Weighted(SetId set, const Cell& robot) override;
 
  private:
   /// One hypothesis: where its value lies relative to the robot's place in plane 0.

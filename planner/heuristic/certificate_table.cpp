@@ -1,13 +1,13 @@
 #include "planner/heuristic/certificate_table.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+
+#include "planner/heuristic/certificate_walks.h"
 
 namespace feeler::planner {
 namespace {
 
-constexpr std::uint32_t kInfinite = ~std::uint32_t{0};
 /// Two cells beyond the domain of the map all that is left is what repeats for ever, and a walk there can be projected
 /// back.
 constexpr int kBorder = 2;
@@ -38,14 +38,11 @@ CertificateTable::CertificateTable(const ContactMap& map, const StepCosts& costs
 
 void CertificateTable::FillOrientation(const ContactMap& map, int orientation, std::uint32_t free_units,
                                        std::uint32_t contact_units) {
-  struct Probe {  // a step that shows something
-    std::uint32_t from;
-    std::uint32_t to;    // equal to `from` where blocked
-    std::uint8_t shows;  // neighbours that would return something else
-  };
-  std::vector<Probe> probes;
-  std::vector<std::uint8_t> enters(plane_size_, 0);  // bit d: the step in direction d into this cell is free
-  const auto strides_of = strides();
+  CertificateWalks walks;
+  walks.strides = strides();
+  walks.step_cost = free_units;
+  std::vector<std::uint8_t>& enters = walks.enters;
+  enters.assign(plane_size_, 0);
   for (int z = domain_.min.z(); z <= domain_.max.z(); ++z) {
     for (int y = domain_.min.y(); y <= domain_.max.y(); ++y) {
       for (int x = domain_.min.x(); x <= domain_.max.x(); ++x) {
@@ -63,65 +60,19 @@ void CertificateTable::FillOrientation(const ContactMap& map, int orientation, s
           std::uint32_t to = from;
           if (free && inside) {
             to = static_cast<std::uint32_t>(static_cast<std::int64_t>(from) +
-                                            SignOf(d) * strides_of[static_cast<std::size_t>(AxisOf(d))]);
+                                            SignOf(d) * walks.strides[static_cast<std::size_t>(AxisOf(d))]);
             enters[to] |= static_cast<std::uint8_t>(1U << IndexOf(d));
           }
           // A free step out of the domain shows what its projection, staying in place, would show.
-          if (shows != 0) probes.push_back({from, to, shows});
+          if (shows == 0) continue;
+          const std::uint32_t cost = to == from ? std::min(free_units, contact_units) : free_units;
+          walks.probes.push_back({from, to, cost, shows});
         }
       }
     }
   }
 
-  // Masks by number of neighbours: a probe leads to a smaller mask, a step that shows nothing stays in its mask.
-  std::array<int, kMasks> masks;
-  for (int m = 0; m < kMasks; ++m) masks[static_cast<std::size_t>(m)] = m;
-  std::ranges::stable_sort(masks, {}, [](int m) { return std::popcount(static_cast<unsigned>(m)); });
-  std::vector<std::uint32_t> cost(plane_size_);
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> seeds;  // cost, cell
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> queue;
-  std::uint16_t* const planes = &values_[static_cast<std::size_t>(orientation * kMasks) * plane_size_];
-  for (const int mask : masks) {
-    if (mask == 0) continue;
-    std::ranges::fill(cost, kInfinite);
-    seeds.clear();
-    for (const Probe& probe : probes) {
-      if ((probe.shows & mask) == 0) continue;
-      const std::uint16_t rest = planes[static_cast<std::size_t>(mask & ~probe.shows) * plane_size_ + probe.to];
-      if (rest == kUnreachable) continue;
-      const std::uint32_t value = rest + (probe.to == probe.from ? std::min(free_units, contact_units) : free_units);
-      if (value < cost[probe.from]) {
-        cost[probe.from] = value;
-        seeds.emplace_back(value, probe.from);
-      }
-    }
-    std::ranges::sort(seeds);
-    // All steps cost the same, so the queue of relaxed cells is sorted by itself and merging it with the seeds is
-    // Dijkstra's algorithm.
-    queue.clear();
-    std::size_t next_seed = 0;
-    std::size_t next_queued = 0;
-    while (next_seed < seeds.size() || next_queued < queue.size()) {
-      const bool take_seed = next_queued == queue.size() ||
-                             (next_seed < seeds.size() && seeds[next_seed].first <= queue[next_queued].first);
-      const auto [value, cell] = take_seed ? seeds[next_seed++] : queue[next_queued++];
-      if (value != cost[cell]) continue;
-      for (const Direction d : kDirections) {
-        if ((enters[cell] >> IndexOf(d) & 1) == 0) continue;
-        const auto before = static_cast<std::uint32_t>(static_cast<std::int64_t>(cell) -
-                                                       SignOf(d) * strides_of[static_cast<std::size_t>(AxisOf(d))]);
-        if (value + free_units < cost[before]) {
-          cost[before] = value + free_units;
-          queue.emplace_back(cost[before], before);
-        }
-      }
-    }
-    std::uint16_t* const plane = planes + static_cast<std::size_t>(mask) * plane_size_;
-    for (std::size_t i = 0; i < plane_size_; ++i) {
-      plane[i] = cost[i] == kInfinite ? kUnreachable
-                                      : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kUnreachable - 1));
-    }
-  }
+  FillCertificates(walks, 6, &values_[static_cast<std::size_t>(orientation * kMasks) * plane_size_]);
 }
 
 }  // namespace feeler::planner

@@ -7,6 +7,7 @@
 #include "core/lattice.h"
 #include "core/task.h"
 #include "planner/contact/contact_map.h"
+#include "planner/heuristic/certificate_walks.h"
 
 namespace feeler::planner {
 
@@ -31,7 +32,7 @@ StepCosts LowerStepCosts(const CostWeights& cost, int longest_move);
 class CertificateTable {
  public:
   static constexpr int kMasks = 64;
-  static constexpr std::uint16_t kUnreachable = 0xFFFF;
+  static constexpr std::uint16_t kUnreachable = kNoCertificate;
 
   CertificateTable(const ContactMap& map, const StepCosts& costs, const Cell& spread);
 

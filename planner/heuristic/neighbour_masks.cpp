@@ -1,6 +1,7 @@
 #include "planner/heuristic/neighbour_masks.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <tuple>
 
 namespace feeler::planner {
@@ -8,12 +9,12 @@ namespace {
 
 /// Members of the window whose neighbour `by` (a non-zero offset in the window's plane) is in `bits` too.
 Bits256 WithNeighbourInWindow(const Bits256& bits, const Cell& by) {
-  Bits256 columns;  // where x + by.x stays in the window
-  for (int y = 0; y < 16; ++y) {
-    for (int x = std::max(0, -by.x()); x < 16 - std::max(0, by.x()); ++x) columns.Set(x + 16 * y);
-  }
+  if (std::abs(by.x()) > 15 || std::abs(by.y()) > 15) return {};
+  // The columns of the window in which x + by.x stays inside.
+  const std::uint64_t row = by.x() >= 0 ? 0xFFFFU >> by.x() : 0xFFFFU << -by.x() & 0xFFFFU;
+  const std::uint64_t rows = row * 0x0001000100010001;
+  const Bits256 columns{{rows, rows, rows, rows}};
   const int down = by.x() + 16 * by.y();
-  if (down >= 256 || down <= -256) return {};
   return bits & columns & (down >= 0 ? bits.Down(down) : bits.Up(-down));
 }
 
@@ -23,7 +24,7 @@ void NeighbourMasks(const HypothesisSets& sets, SetId set, const std::array<Cell
                     std::vector<std::uint8_t>& masks) {
   masks.clear();
   const auto slabs = sets.slabs(set);
-  if (sets.shiftable()) {
+  if (sets.single_window()) {
     for (const Slab& slab : slabs) {
       std::array<Bits256, 6> with;
       for (std::size_t i = 0; i < neighbours.size(); ++i) {

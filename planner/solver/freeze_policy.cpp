@@ -53,15 +53,8 @@ class Freezer {
         PolicyBranch branch;
         branch.outcome = outcome.outcome;
         branch.probability = outcome.weight / weight;
-        Cell shift = outcome.shift;
-        if (!graph_.canonical()) {
-          // All nodes in problem coordinates.
-          shift = Cell::Zero();
-        } else if (b == root) {
-          shift += root_frame;
-        }
-        const Cell leaf_frame = graph_.canonical() ? Cell(Cell::Zero()) : Cell(graph_.frame(b) + outcome.shift);
-        branch.next = outcome.next == kNoBelief ? LeafNode(outcome.set, leaf_frame) : index_.at(outcome.next);
+        branch.next = outcome.next == kNoBelief ? LeafNode(outcome.set, Cell::Zero()) : index_.at(outcome.next);
+        const Cell shift = b == root ? Cell(outcome.shift + root_frame) : outcome.shift;
         branch.shift = shift;
         node.expected_cost +=
             branch.probability * (graph_.problem().cost.Of(outcome.outcome) + policy_.nodes[branch.next].expected_cost);

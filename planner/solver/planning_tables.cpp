@@ -13,12 +13,17 @@ Cell SpreadOf(const Problem& problem) {
 
 PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& /*options*/)
     : map_(problem.map), masks_(*problem.map) {
-  certificate_ = std::make_shared<CertificateTable>(
-      *problem.map, LowerStepCosts(problem.cost, problem.move_lengths.back()), SpreadOf(problem));
+  const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
+  if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
+    local_certificate_ = std::make_shared<LocalCertificateTable>(problem, costs);
+  } else {
+    certificate_ = std::make_shared<CertificateTable>(*problem.map, costs, SpreadOf(problem));
+  }
 }
 
-std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& /*problem*/, const HypothesisSets& sets,
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem, const HypothesisSets& sets,
                                                                const SolverOptions& /*options*/) const {
+  if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   return std::make_unique<CertificateHeuristic>(sets, certificate_);
 }
 

@@ -5,6 +5,7 @@
 #include "planner/belief/contact_masks.h"
 #include "planner/heuristic/belief_heuristic.h"
 #include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/local_certificate.h"
 #include "planner/solver/solve.h"
 
 namespace feeler::planner {
@@ -14,7 +15,7 @@ class PlanningTables {
   PlanningTables(const Problem& problem, const SolverOptions& options);
 
   const ContactMasks& masks() const { return masks_; }
-  /// The heuristic of a belief store of `problem`.
+  /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
   std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets,
                                                  const SolverOptions& options) const;
 
@@ -22,6 +23,7 @@ class PlanningTables {
   std::shared_ptr<const ContactMap> map_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
+  std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then
 };
 
 }  // namespace feeler::planner

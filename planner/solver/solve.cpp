@@ -1,10 +1,16 @@
 #include "planner/solver/solve.h"
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
+#include "core/error.h"
 #include "planner/belief/belief_graph.h"
+#include "planner/solver/bounded_search.h"
+#include "planner/solver/experience.h"
 #include "planner/solver/freeze_policy.h"
+#include "planner/solver/indistinguishable.h"
 #include "planner/solver/planning_tables.h"
 #include "planner/solver/rtdp_bel.h"
 #include "planner/solver/stop_watch.h"
@@ -14,49 +20,159 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-SolverResult SolveByRtdpBel(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
-                            bool canonical) {
-  StopWatch watch(options);
-  BeliefGraph graph(problem, tables.masks(), canonical);
-  const auto heuristic = tables.MakeHeuristic(problem, graph.sets(), options);
-  graph.SetHeuristic(heuristic.get());
-  SolverResult result;
-  result.expected_cost = kInfinity;
-  const BeliefId start = graph.Start();
-  if (start != kNoBelief) {
-    const double weight = graph.Weight(start);
-    RtdpBel search(
-        graph, [&](BeliefId b) { return options.epsilon * graph.Heuristic(b); }, options.seed);
-    const auto lower = [&] { return std::max(search.Lower(start), search.Value(start) / options.epsilon) / weight; };
-    const auto stop = [&](std::int64_t expansions) {
-      if (watch.RowDue()) {
-        options.on_bounds({watch.wall_s(), search.trials(), expansions, lower(), kInfinity});
-      }
-      return watch.Stop(expansions);
-    };
-    if (const auto why = search.Run(start, stop)) {
-      result.status = *why;
+/// One attempt at a problem: the belief graph, the clocks, and what every solver does with them.
+class Attempt {
+ public:
+  Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+          const Experience& experience, bool canonical)
+      : options_(options), experience_(experience), watch_(options), graph_(problem, tables.masks(), canonical) {
+    heuristic_ = tables.MakeHeuristic(problem, graph_.sets(), options);
+    graph_.SetHeuristic(heuristic_.get());
+    result_.expected_cost = kInfinity;
+  }
+
+  SolverResult Run() {
+    start_ = graph_.Start();
+    if (start_ == kNoBelief) {
+      result_.policy = FreezePolicy(graph_, [](BeliefId) { return 0; });
     } else {
-      result.policy = FreezePolicy(graph, [&](BeliefId b) { return search.Action(b); });
+      weight_ = graph_.Weight(start_);
+      switch (options_.solver) {
+        case SolverKind::kCertified: RunCertified(); break;
+        case SolverKind::kRtdpBel: RunRtdpBel(Inflated(options_.epsilon)); break;
+        case SolverKind::kERtdpBel: RunERtdpBel(); break;
+      }
     }
-    result.lower_bound = lower();
-    result.trials = search.trials();
-    result.expansions = search.expansions();
-  } else {
-    result.policy = FreezePolicy(graph, [](BeliefId) { return 0; });
+    Finish();
+    return std::move(result_);
   }
-  if (result.policy) {
-    result.expected_cost = result.policy->expected_cost;
-    result.lower_bound = std::min(result.lower_bound, result.expected_cost);
-    result.policy->lower_bound = result.lower_bound;
+
+ private:
+  auto Inflated(double epsilon) {
+    return [this, epsilon](BeliefId b) { return epsilon * graph_.Heuristic(b); };
   }
-  if (options.on_bounds) {
-    options.on_bounds({watch.wall_s(), result.trials, result.expansions, result.lower_bound, result.expected_cost});
+
+  /// RTDP-Bel with heur^E in place of epsilon * heur.
+  void RunERtdpBel() {
+    if (experience_.kind == ExperienceKind::kNone || experience_.policy == nullptr) {
+      return RunRtdpBel(Inflated(options_.epsilon));
+    }
+    ExperienceMdp mdp = experience_.kind == ExperienceKind::kRollout
+                            ? RollOut(graph_, *experience_.policy)
+                            : Transplant(graph_, *experience_.problem, *experience_.policy);
+    const ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon);
+    RunRtdpBel([&](BeliefId b) { return graph_.Weight(b) * heuristic(b); });
   }
-  result.wall_s = watch.wall_s();
-  result.cpu_s = watch.cpu_s();
-  return result;
-}
+
+  template <class Initial>
+  void RunRtdpBel(Initial initial) {
+    RtdpBel search(graph_, initial, options_.seed);
+    const auto lower = [&] {
+      return std::max(search.Lower(start_), search.Value(start_) / options_.epsilon) / weight_;
+    };
+    const auto why = search.Run(start_, [&](std::int64_t expansions) {
+      if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
+      return watch_.Stop(expansions);
+    });
+    result_.lower_bound = lower();
+    result_.trials = search.trials();
+    result_.expansions = search.expansions();
+    if (why) {
+      result_.status = *why;
+    } else {
+      result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return search.Action(b); });
+    }
+  }
+
+  /// A first policy by inflated RTDP-Bel, then BoundedSearch until the gap is closed. How much inflation finds a policy
+  /// fast depends on how tight the heuristic is, so several take turns with growing budgets.
+  void RunCertified() {
+    using Search = RtdpBel<BeliefGraph, decltype(Inflated(1.0))>;
+    constexpr std::array<double, 3> kInflations = {1.2, 2.0, 5.0};
+    std::vector<Search> searches;
+    searches.reserve(kInflations.size());
+    for (const double epsilon : kInflations) searches.emplace_back(graph_, Inflated(epsilon), options_.seed);
+    const auto lower = [&] {
+      double best = 0.0;
+      for (std::size_t i = 0; i < searches.size(); ++i) {
+        best = std::max({best, searches[i].Lower(start_), searches[i].Value(start_) / kInflations[i]});
+      }
+      return best / weight_;
+    };
+    const auto expansions = [&] {
+      std::int64_t sum = 0;
+      for (const Search& search : searches) sum += search.expansions();
+      return sum;
+    };
+    Search* first = nullptr;
+    std::optional<SolverStatus> why;
+    for (std::int64_t budget = 5000; first == nullptr && !why; budget *= 4) {
+      for (std::size_t i = 0; i < searches.size() && first == nullptr && !why; ++i) {
+        const std::int64_t until = searches[i].updates() + budget;
+        bool over_budget = false;
+        why = searches[i].Run(start_, [&](std::int64_t) -> std::optional<SolverStatus> {
+          if (watch_.RowDue()) Row(result_.trials, expansions(), lower(), kInfinity);
+          over_budget = searches[i].updates() >= until;
+          if (over_budget) return SolverStatus::kExpansionLimit;
+          return watch_.Stop(expansions());
+        });
+        if (!why) {
+          first = &searches[i];
+        } else if (over_budget) {
+          why.reset();
+        }
+      }
+    }
+    result_.lower_bound = lower();
+    if (first == nullptr) {
+      result_.status = *why;
+      result_.expansions = expansions();
+      return;
+    }
+    BoundedSearch search(graph_, *first, options_.gap);
+    const auto both = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
+    const std::int64_t before = expansions() - first->expansions();
+    const auto gap_closed = [&] { return search.Upper(start_) / weight_ <= options_.gap * both(); };
+    why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
+      if (watch_.RowDue()) Row(search.trials(), searched + before, both(), search.Upper(start_) / weight_);
+      if (gap_closed()) return SolverStatus::kGap;
+      return watch_.Stop(searched + before);
+    });
+    result_.lower_bound = both();
+    result_.trials = first->trials() + search.trials();
+    result_.expansions = search.expansions() + before;
+    result_.status = why.value_or(SolverStatus::kGap);
+    result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return search.Action(b); });
+    if (result_.status == SolverStatus::kGap &&
+        result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
+      result_.status = SolverStatus::kConverged;
+    }
+  }
+
+  void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) {
+    options_.on_bounds({watch_.wall_s(), trials, expansions, lower, upper});
+  }
+
+  void Finish() {
+    if (result_.policy) {
+      result_.expected_cost = result_.policy->expected_cost;
+      result_.lower_bound = std::min(result_.lower_bound, result_.expected_cost);  // rounding
+      result_.policy->lower_bound = result_.lower_bound;
+    }
+    if (options_.on_bounds) Row(result_.trials, result_.expansions, result_.lower_bound, result_.expected_cost);
+    result_.wall_s = watch_.wall_s();
+    result_.cpu_s = watch_.cpu_s();
+  }
+
+  const SolverOptions& options_;
+  const Experience& experience_;
+  StopWatch watch_;
+  BeliefGraph graph_;
+  std::unique_ptr<BeliefHeuristic> heuristic_;
+  BeliefId start_ = kNoBelief;
+  double weight_ = 1.0;
+  SolverResult result_;
+};
 
 }  // namespace
 
@@ -91,12 +207,25 @@ SolverResult Solve(const Problem& problem, const SolverOptions& options, std::sh
                    const Experience& experience) {
   Validate(problem);
   Validate(options);
-  static_cast<void>(experience);
+  if (experience.kind == ExperienceKind::kNaive && experience.policy != nullptr && experience.problem == nullptr) {
+    throw InputError("experience", "a naive experience needs the problem its policy was made for");
+  }
   if (!tables) tables = BuildPlanningTables(problem, options);
-  const bool canonical = options.canonical_translation && problem.generous_workspace;
-  SolverResult result = SolveByRtdpBel(problem, options, *tables, canonical);
+  const bool canonical =
+      options.canonical_translation && problem.generous_workspace && options.solver != SolverKind::kERtdpBel;
+  if (!problem.generous_workspace) {
+    SolverResult result;
+    result.indistinguishable = IndistinguishablePairs(problem, tables->masks());
+    if (!result.indistinguishable.empty()) {
+      result.status = SolverStatus::kUnlocalizable;
+      result.expected_cost = kInfinity;
+      result.lower_bound = kInfinity;
+      return result;
+    }
+  }
+  SolverResult result = Attempt(problem, options, *tables, experience, canonical).Run();
   if (canonical && result.policy && !StaysInWorkspace(problem, *result.policy)) {
-    result = SolveByRtdpBel(problem, options, *tables, false);
+    result = Attempt(problem, options, *tables, experience, false).Run();
   }
   return result;
 }
