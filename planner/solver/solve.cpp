@@ -20,6 +20,13 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// epsilon * heur, times the weight of the belief.
+struct InflatedHeuristic {
+  const BeliefGraph* graph = nullptr;
+  double epsilon = 1.0;
+  double operator()(BeliefId b) const { return epsilon * graph->Heuristic(b); }
+};
+
 /// One attempt at a problem: the belief graph, the clocks, and what every solver does with them.
 class Attempt {
  public:
@@ -48,9 +55,7 @@ class Attempt {
   }
 
  private:
-  auto Inflated(double epsilon) {
-    return [this, epsilon](BeliefId b) { return epsilon * graph_.Heuristic(b); };
-  }
+  InflatedHeuristic Inflated(double epsilon) const { return {&graph_, epsilon}; }
 
   /// RTDP-Bel with heur^E in place of epsilon * heur.
   void RunERtdpBel() {
@@ -87,7 +92,7 @@ class Attempt {
   /// A first policy by inflated RTDP-Bel, then BoundedSearch until the gap is closed. How much inflation finds a policy
   /// fast depends on how tight the heuristic is, so several take turns with growing budgets.
   void RunCertified() {
-    using Search = RtdpBel<BeliefGraph, decltype(Inflated(1.0))>;
+    using Search = RtdpBel<BeliefGraph, InflatedHeuristic>;
     constexpr std::array<double, 3> kInflations = {1.2, 2.0, 5.0};
     std::vector<Search> searches;
     searches.reserve(kInflations.size());
