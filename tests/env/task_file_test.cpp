@@ -137,6 +137,16 @@ TEST(TaskFile, AngularAxesHaveTheirOwnResolution) {
   EXPECT_EQ(LargestCuboid(task), Cell(5, 5, 1));
 }
 
+TEST(TaskFile, TheExampleOfTheDocumentationLoads) {
+  const std::string page = ReadTextFile(fs::path(FEELER_SOURCE_DIR) / "docs/task-file.md");
+  const auto begin = page.find("```xml\n") + 7;
+  const TaskModel example = LoadTaskFromText(page.substr(begin, page.find("```", begin) - begin), "peg.xml");
+  EXPECT_EQ(example.lid_geoms.size(), 1U);
+  // Each field of a task is explained.
+  for (const auto& [field, value] : TaskText().numbers) EXPECT_THAT(page, HasSubstr("`" + field + "`"));
+  for (const auto& [field, value] : TaskText().texts) EXPECT_THAT(page, HasSubstr("`" + field + "`"));
+}
+
 TEST(TaskFile, DefaultTextIsValid) { EXPECT_EQ(ErrorOf(TaskText()), "no error"); }
 
 TEST(TaskFile, EveryMissingFieldIsNamed) {
