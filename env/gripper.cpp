@@ -129,7 +129,7 @@ void EmitGripper(const GripperFit& fit, int visual_group, int collision_group, X
   const double palm_half = 0.5 * (palm_end - kAdapter_m);
   const double reach = fit.half_opening_m + kPadThickness_m + kFingerThickness_m;  // outside of a finger
   const double palm_half_x = std::max(0.034, reach + 0.006);
-  add("cylinder", {0, 0, 0.5 * kAdapter_m}, Eigen::Vector2d(0.0375, 0.5 * kAdapter_m), 0.15, "gripper_metal", true);
+  add("cylinder", {0, 0, 0.5 * kAdapter_m}, Eigen::Vector2d(0.0375, 0.5 * kAdapter_m), 0.15, "gripper_metal", false);
   add("box", {0, 0, kAdapter_m + palm_half - 0.004}, Eigen::Vector3d(palm_half_x - 0.006, 0.0235, palm_half - 0.004),
       0.35, "gripper_body", false);
   add("box", {0, 0, kAdapter_m + palm_half}, Eigen::Vector3d(palm_half_x - 0.008, 0.0195, palm_half), 0.1,

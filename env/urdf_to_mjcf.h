@@ -33,10 +33,10 @@ struct RobotMjcf {
 /// Reads a robot description with urdfdom and emits it into an MJCF document: the tree of bodies under its
 /// <worldbody>, materials, one torque motor per revolute joint (`motor_JOINT`, gear 1, control range = effort limit),
 /// and the exclusion of contact between each link and its neighbours. Fixed joints become bodies of their own, so that
-/// every link of the URDF is a body of the same name. Every physical attribute is written out: the defaults of the
-/// receiving document do not reach the robot.
-/// Throws InputError for what urdfdom rejects, for joints that are neither fixed nor revolute with limits about an
-/// axis, for shapes that are meshes, and for moving links without inertia.
+/// every link of the URDF is a body of the same name. Collision cylinders that are at least about as long as wide
+/// become spheres or capsules (round ends). Every physical attribute is written out: the defaults of the receiving
+/// document do not reach the robot. Throws InputError for what urdfdom rejects, for joints that are neither fixed nor
+/// revolute with limits about an axis, for shapes that are meshes, and for moving links without inertia.
 RobotMjcf EmitRobot(const std::string& urdf_file, const UrdfToMjcfOptions& options, tinyxml2::XMLElement& mujoco);
 
 }  // namespace feeler::env

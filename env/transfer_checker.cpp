@@ -1,0 +1,122 @@
+#include "env/transfer_checker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace feeler::env {
+namespace {
+
+constexpr double kLargestClearance_m = 0.015;
+
+// For every joint: over all geoms that it moves, the longest chain of body offsets from the joint to the geom plus the
+// geom's bounding radius. A point can be no farther from the joint than that, however the joints stand.
+JointVector Reach(const Scene& scene) {
+  const mjModel& model = *scene.model;
+  JointVector reach = JointVector::Zero();
+  for (int geom = 0; geom < model.ngeom; ++geom) {
+    const ScenePart part = scene.geom_part[static_cast<std::size_t>(geom)];
+    if (part != ScenePart::kRobot && part != ScenePart::kTool) continue;
+    double distance = model.geom_rbound[geom] + Eigen::Map<const Eigen::Vector3d>(model.geom_pos + 3 * geom).norm();
+    for (int body = model.geom_bodyid[geom]; body > 0; body = model.body_parentid[body]) {
+      for (int i = 0; i < kJointCount; ++i) {
+        if (model.jnt_bodyid[scene.joint[static_cast<std::size_t>(i)]] == body) {
+          reach[i] = std::max(reach[i], distance);
+        }
+      }
+      distance += Eigen::Map<const Eigen::Vector3d>(model.body_pos + 3 * body).norm();
+    }
+  }
+  return reach;
+}
+
+std::string BodyOfGeom(const mjModel& model, int geom) {
+  const char* name = mj_id2name(&model, mjOBJ_GEOM, geom);
+  if (name == nullptr) name = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
+  return name == nullptr ? "unnamed geom" : name;
+}
+
+}  // namespace
+
+TransferChecker::TransferChecker(const Scene& scene, double clearance_m)
+    : scene_(scene), targets_{scene.task.world_T_target}, clearance_m_(clearance_m), reach_m_(Reach(scene)) {
+  if (!(clearance_m >= 0.0 && clearance_m <= kLargestClearance_m)) {
+    throw InputError("transfer", fmt::format("clearance {} m out of range", clearance_m), "0 to 0.015 m");
+  }
+  ModelHandle model(mj_copyModel(nullptr, scene.model.get()));
+  if (!model) throw WorldError("MuJoCo", "no memory for the model");
+  std::fill(model->geom_margin, model->geom_margin + model->ngeom, clearance_m);
+  model_ = std::shared_ptr<const mjModel>(model.release(), ModelDeleter());
+  data_ = MakeData(*model_);
+}
+
+TransferChecker::TransferChecker(const TransferChecker& other)
+    : scene_(other.scene_),
+      model_(other.model_),
+      data_(MakeData(*other.model_)),
+      targets_(other.targets_),
+      clearance_m_(other.clearance_m_),
+      reach_m_(other.reach_m_) {}
+
+void TransferChecker::SetTargetPoses(std::vector<Pose> world_T_target) {
+  if (world_T_target.empty()) throw InputError("transfer", "no pose of the target", "give at least one");
+  targets_ = std::move(world_T_target);
+}
+
+bool TransferChecker::Free(const JointVector& q_rad) {
+  SetJointPositions(scene_, q_rad, *data_);
+  for (const Pose& target : targets_) {
+    SetTargetPose(scene_, target, *data_);
+    mj_kinematics(model_.get(), data_.get());
+    mj_collision(model_.get(), data_.get());
+    if (data_->ncon > 0) {
+      TakeMujocoWarning();  // a full contact buffer is as good an answer as one contact
+      return false;
+    }
+  }
+  return true;
+}
+
+std::string TransferChecker::Collision(const JointVector& q_rad) {
+  if (Free(q_rad)) return "";
+  const mjContact& contact = data_->contact[0];
+  return BodyOfGeom(*model_, contact.geom1) + " and " + BodyOfGeom(*model_, contact.geom2);
+}
+
+planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
+                                   const Pose& world_T_tool, const TransferSettings& settings) {
+  planner::TransferOptions options = settings.search;
+  options.seed = settings.seed;
+  options.reach_m = checker.reach_m();
+  // Half the spacing stays within the clearance, and so does half of it again for rounded corners.
+  options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
+  planner::JointBounds bounds;
+  bounds.lower_rad = JointVector::Constant(-settings.joint_bound_rad);
+  bounds.upper_rad = JointVector::Constant(settings.joint_bound_rad);
+  const planner::TransferPlanner planner(
+      bounds, [&](const Eigen::VectorXd& q) { return checker.Free(q); }, options);
+  std::vector<Eigen::VectorXd> goals;
+  for (const JointVector& q : ToolInverseKinematics(scene, world_T_tool)) goals.emplace_back(q);
+  planner::TransferPlan plan = planner.Plan(start_rad, goals);
+  if (plan.status == planner::TransferStatus::kStartInvalid && planner.WithinBounds(start_rad)) {
+    plan.reason += ": " + checker.Collision(start_rad);
+  } else if (plan.status == planner::TransferStatus::kNoGoal && !goals.empty()) {
+    plan.reason += ": " + checker.Collision(goals.front());
+  }
+  return plan;
+}
+
+std::vector<Pose> TargetCandidates(const Pose& estimate, const Eigen::Vector3d& half_extents_m) {
+  std::vector<Pose> candidates{estimate};
+  if (half_extents_m.isZero()) return candidates;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d sign((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    candidates.push_back(estimate * Eigen::Translation3d(sign.cwiseProduct(half_extents_m)));
+  }
+  return candidates;
+}
+
+}  // namespace feeler::env
