@@ -11,19 +11,27 @@ Cell SpreadOf(const Problem& problem) {
 
 }  // namespace
 
-PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& /*options*/)
+PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options)
     : map_(problem.map), masks_(*problem.map) {
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
-  if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
-    local_certificate_ = std::make_shared<LocalCertificateTable>(problem, costs);
-  } else {
-    certificate_ = std::make_shared<CertificateTable>(*problem.map, costs, SpreadOf(problem));
+  switch (options.heuristic) {
+    case HeuristicKind::kCertificate:
+      if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
+        local_certificate_ = std::make_shared<LocalCertificateTable>(problem, costs);
+      } else {
+        certificate_ = std::make_shared<CertificateTable>(*problem.map, costs, SpreadOf(problem));
+      }
+      break;
+    case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
+    case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
 }
 
-std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem, const HypothesisSets& sets,
-                                                               const SolverOptions& /*options*/) const {
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
+                                                               const HypothesisSets& sets) const {
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
+  if (lines_) return std::make_unique<LineHeuristic>(sets, lines_);
+  if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
   return std::make_unique<CertificateHeuristic>(sets, certificate_);
 }
 

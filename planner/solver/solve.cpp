@@ -33,7 +33,7 @@ class Attempt {
   Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
           const Experience& experience, bool canonical)
       : options_(options), experience_(experience), watch_(options), graph_(problem, tables.masks(), canonical) {
-    heuristic_ = tables.MakeHeuristic(problem, graph_.sets(), options);
+    heuristic_ = tables.MakeHeuristic(problem, graph_.sets());
     graph_.SetHeuristic(heuristic_.get());
     result_.expected_cost = kInfinity;
   }

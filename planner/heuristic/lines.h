@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/lattice.h"
+#include "planner/contact/contact_map.h"
+#include "planner/heuristic/belief_heuristic.h"
+#include "planner/heuristic/certificate_table.h"
+
+namespace feeler::planner {
+
+/// Lower bounds on the cost of localizing a line: `length` hypotheses in consecutive cells along an axis, for every
+/// displacement of the tool from the first of them. Tabled times the length. Computed by single steps (see StepCosts);
+/// a step that splits the line leads to the runs of the parts. Lines of 2..16.
+class LineTable {
+ public:
+  static constexpr int kLongest = 16;
+  static constexpr std::uint16_t kUnreachable = 0xFFFF;
+
+  LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread);
+
+  double unit() const { return unit_; }
+  /// In table units, times the length; `displacement` from the first (least) hypothesis of the line.
+  std::uint16_t At(const Cell& displacement, int axis, int length, int orientation) const {
+    if (length < 2) return 0;
+    const Grid& grid = grids_[static_cast<std::size_t>(axis)];
+    return grid.values[(static_cast<std::size_t>(orientation * (kLongest + 1) + length)) * grid.cells +
+                       grid.Index(displacement)];
+  }
+
+ private:
+  struct Grid {
+    CellBox domain;
+    Cell size = Cell::Zero();
+    std::size_t cells = 0;
+    std::vector<std::uint16_t> values;
+    std::size_t Index(const Cell& displacement) const {
+      const Cell c = domain.Clamp(displacement) - domain.min;
+      return static_cast<std::size_t>((std::int64_t{c.z()} * size.y() + c.y()) * size.x() + c.x());
+    }
+  };
+  void Fill(const ContactMap& map, int axis, int orientation, int spread, std::uint32_t free_units,
+            std::uint32_t contact_units);
+
+  double unit_ = 1.0;
+  std::array<Grid, 3> grids_;
+};
+
+/// The medium heuristic, of the paper setting: a belief is partitioned into maximal runs along an axis, and w(H) V(r,H)
+/// >= sum over the parts of w(Hi) V(r,Hi), because a policy that localizes H localizes every part of it. The best of
+/// the three axes. Needs a uniform prior (else zero).
+class LineHeuristic final : public BeliefHeuristic {
+ public:
+  LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table);
+  double Weighted(SetId set, const Cell& robot) override;
+
+ private:
+  struct Run {
+    Cell first = Cell::Zero();
+    int length = 1;
+    int orientation = 0;
+  };
+  struct Runs {
+    std::array<std::uint32_t, 4> first{};  ///< per axis; [3] is the end
+    bool ready = false;
+  };
+  const Runs& Prepare(SetId set);
+
+  const HypothesisSets& sets_;
+  std::shared_ptr<const LineTable> table_;
+  std::vector<Runs> runs_of_;
+  std::vector<Run> runs_;
+};
+
+}  // namespace feeler::planner
