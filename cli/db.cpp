@@ -156,7 +156,7 @@ void Export(const Flags& flags) {
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
   const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
-  WritePolicy(problem, *stored.policy, flags.out);
+  WritePolicy(problem, *stored.policy, setup.task().name, flags.out);
 }
 
 }  // namespace

@@ -7,7 +7,9 @@
 
 namespace feeler::cli {
 
-/// Writes the policy file of a problem (docs/file-formats.md) to `path`, or to stdout if it is empty.
-void WritePolicy(const planner::Problem& problem, const planner::Policy& policy, const std::string& path);
+/// Writes the policy file of a task or problem called `name` (docs/file-formats.md) to `path`, or to stdout if it is
+/// empty.
+void WritePolicy(const planner::Problem& problem, const planner::Policy& policy, const std::string& name,
+                 const std::string& path);
 
 }  // namespace feeler::cli

@@ -1,6 +1,7 @@
 // feeler run: seeded episodes in simulation.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "env/sensing/noise.h"
 #include "evaluation/episode_json.h"
 #include "evaluation/run_summary.h"
+#include "workflow/database_builder.h"
 #include "workflow/episode.h"
 #include "workflow/episode_video.h"
 

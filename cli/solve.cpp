@@ -96,7 +96,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
       fmt::print(stderr, "  {} [{}, {}, {}] and {} [{}, {}, {}]\n", i, a.x(), a.y(), a.z(), j, b.x(), b.y(), b.z());
     }
   }
-  if (result.complete() && !flags.out.empty()) WritePolicy(problem, *result.policy, flags.out);
+  if (result.complete() && !flags.out.empty())
+    WritePolicy(problem, *result.policy, flags.task.empty() ? problem.name : flags.task, flags.out);
   if (flags.json) {
     nlohmann::json pairs = nlohmann::json::array();
     for (const auto& [i, j] : result.indistinguishable) pairs.push_back({i, j});

@@ -5,8 +5,9 @@ target_include_directories(feeler_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(feeler_options INTERFACE -Wall -Wextra -Wshadow -Wpedantic -ffp-contract=off)
 target_compile_definitions(feeler_options INTERFACE FEELER_VERSION="${PROJECT_VERSION}")
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # GCC 12 reports a false overlap in `"text" + std::string` (GCC bug 105651).
-  target_compile_options(feeler_options INTERFACE -Wno-restrict)
+  # GCC 12 reports false overlaps in `"text" + std::string` (GCC bug 105651) and false sizes in comparisons of byte
+  # vectors (GCC bug 107852).
+  target_compile_options(feeler_options INTERFACE -Wno-restrict -Wno-stringop-overread)
 endif()
 if(FEELER_WERROR)
   target_compile_options(feeler_options INTERFACE -Werror)

@@ -27,6 +27,9 @@ struct EpisodeOptions {
   bool withhold_true_pose = false;
 };
 
+/// The world of the task's episodes: robot, tool, target, fixtures.
+std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup);
+
 /// One attempt: reset, hypotheses, transfer to the start pose, localize by touch, insert, score.
 /// One object per thread; the scene is shared.
 class EpisodeRunner {
@@ -39,9 +42,12 @@ class EpisodeRunner {
   env::InsertionEnv& environment() { return *environment_; }
 
  private:
+  struct TransferSearch;  ///< plans free-space motions around every pose that the target may have
+
   std::shared_ptr<const PlanningSetup> setup_;
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
+  std::shared_ptr<TransferSearch> transfer_search_;
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 

@@ -1,7 +1,10 @@
 #include "workflow/episode_draw.h"
 
+#include <vector>
+
 #include "core/error.h"
 #include "core/random.h"
+#include "env/insertion_env.h"
 
 namespace feeler::workflow {
 
@@ -13,17 +16,12 @@ EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, 
   draw.extents = family.problems[problem.Index(family.problems.size())];
   draw.world_T_estimate = task.world_T_target;
 
-  RandomStream truth(seed, episode, "true pose");
-  Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
+  std::vector<int> extents;
   for (const UncertainAxis& axis : task.axes) {
-    // One draw per axis, whatever its kind, so that a task's other axes do not shift the stream.
-    const double unit = truth.Uniform(-0.5, 0.5);
-    if (axis.angular()) continue;
-    const int index = static_cast<int>(axis.kind);
-    offset_m[index] = unit * draw.extents[index] * task.cell_m;
+    extents.push_back(axis.angular() ? axis.max_cells : draw.extents[static_cast<int>(axis.kind)]);
   }
-  draw.world_T_true = draw.world_T_estimate;
-  draw.world_T_true.translation() += draw.world_T_estimate.linear() * offset_m;
+  RandomStream truth(seed, episode, "true pose");
+  draw.world_T_true = env::DrawTruePose(task, draw.world_T_estimate, extents, truth);
   return draw;
 }
 

@@ -1,0 +1,135 @@
+#include "workflow/episode.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/random.h"
+#include "env/transfer_checker.h"
+#include "workflow/cpu_clock.h"
+
+namespace feeler::workflow {
+namespace {
+
+PoseError ErrorOf(const Task& task, const Pose& world_T_true, const Pose& world_T_estimate) {
+  const Pose difference = world_T_true.inverse() * world_T_estimate;
+  const int along = AxisOf(task.insertion);
+  Eigen::Vector3d across = difference.translation();
+  across[along] = 0.0;
+  return {across.norm(), std::abs(difference.translation()[along]), Eigen::AngleAxisd(difference.linear()).angle()};
+}
+
+Eigen::Vector3d HalfExtents(const Task& task, const planner::Extents& extents) {
+  return 0.5 * task.cell_m * Eigen::Vector3d(extents.nx, extents.ny, extents.nz);
+}
+
+bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
+  return error.lateral_m <= tolerance.lateral_m && error.vertical_m <= tolerance.vertical_m &&
+         error.angle_rad <= tolerance.angle_rad;
+}
+
+}  // namespace
+
+std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
+  return std::make_shared<const env::Scene>(
+      env::BuildScene(setup.task(), setup.model.xml, env::ModelsFolder().string()));
+}
+
+struct EpisodeRunner::TransferSearch {
+  explicit TransferSearch(std::shared_ptr<const env::Scene> episode_scene)
+      : scene(std::move(episode_scene)), checker(*scene) {}
+
+  std::vector<env::JointVector> Plan(const env::JointVector& start, const Pose& world_T_tool) {
+    const double start_s = ThreadCpuSeconds();
+    const planner::TransferPlan plan = env::PlanTransfer(checker, *scene, start, world_T_tool, settings);
+    cpu_s += ThreadCpuSeconds() - start_s;
+    return {plan.way_points.begin(), plan.way_points.end()};
+  }
+
+  std::shared_ptr<const env::Scene> scene;
+  env::TransferChecker checker;
+  env::TransferSettings settings;
+  double cpu_s = 0.0;
+};
+
+EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
+                             PolicyFactory policy_factory, EpisodeOptions options)
+    : setup_(std::move(setup)), policy_factory_(std::move(policy_factory)), options_(std::move(options)) {
+  transfer_search_ = std::make_shared<TransferSearch>(scene);
+  env::EnvOptions env_options;
+  env_options.robot.transfer_planner = [search = transfer_search_](
+                                           const env::World& /*world*/, const env::JointVector& start,
+                                           const Pose& world_T_tool) { return search->Plan(start, world_T_tool); };
+  environment_ = std::make_unique<env::InsertionEnv>(std::move(scene), env_options);
+}
+
+EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
+  const Task& task = setup_->task();
+  const double cpu_start_s = ThreadCpuSeconds();
+  const EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode);
+
+  EpisodeRecord record;
+  record.task = task.name;
+  record.noise = options_.noise;
+  record.seed = options_.seed;
+  record.episode = episode;
+  record.extents = draw.extents;
+  record.world_T_true = draw.world_T_true;
+  record.world_T_estimate0 = draw.world_T_estimate;
+
+  env::EpisodeOptions reset;
+  reset.episode = episode;
+  reset.world_T_estimate = draw.world_T_estimate;
+  reset.world_T_target = draw.world_T_true;
+  reset.noise = env::NoisePreset(options_.noise);
+  reset.start = env::StartPlace::kHome;
+  reset.withhold_true_pose = options_.withhold_true_pose;
+  environment_->Reset(options_.seed, reset);
+
+  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
+  const double plan_start_s = ThreadCpuSeconds();
+  const std::unique_ptr<policies::Policy> policy = policy_factory_(problem, draw.extents);
+  const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
+  record.policy = policy->name();
+
+  transfer_search_->settings.seed = RandomStream(options_.seed, episode, "transfer").Next();
+  transfer_search_->checker.SetTargetPoses(
+      env::TargetCandidates(draw.world_T_estimate, HalfExtents(task, draw.extents)));
+  transfer_search_->cpu_s = 0.0;
+  const MotionResult transfer =
+      environment_->robot().Transfer(execution::StartPose(task, problem, draw.world_T_estimate));
+  record.timing.transfer_cpu_s = transfer_search_->cpu_s;
+
+  if (transfer.reason == StopReason::kReached) {
+    execution::ExecutorOptions options;
+    if (reset.noise.contact_threshold_n > options.contact_force_n) {
+      options = execution::ExecutorOptions::WithFriction();
+      options.contact_force_n = reset.noise.contact_threshold_n;
+    }
+    record.execution =
+        execution::Execute(task, problem, draw.world_T_estimate, *policy, environment_->robot(), options);
+  } else {
+    record.execution.reason = "transfer to the start pose: " + std::string(ToString(transfer.reason)) +
+                              (transfer.detail.empty() ? "" : ", " + transfer.detail);
+  }
+
+  // The score: from here on the truth may be looked at.
+  const env::InsertionVerdict verdict = environment_->Judge();
+  if (record.execution.world_T_estimate) {
+    record.error = ErrorOf(task, draw.world_T_true, *record.execution.world_T_estimate);
+    record.localized = WithinTolerance(task.tolerance, *record.error);
+  }
+  record.inserted = verdict.inserted;
+  record.peak_force_n = environment_->robot().statistics().peak_force_n;
+  if (record.inserted) {
+    record.reason = "inserted";
+  } else if (record.execution.inserted) {
+    record.reason = "believed inserted, but " + std::string(env::ToString(verdict.reason));
+  } else {
+    record.reason = record.execution.reason;
+  }
+  record.timing.plan_cpu_s = lookup_cpu_s + record.execution.policy_cpu_s;
+  record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
+  return record;
+}
+
+}  // namespace feeler::workflow
