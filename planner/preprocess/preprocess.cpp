@@ -1,59 +1,190 @@
 #include "planner/preprocess/preprocess.h"
 
-#include <atomic>
+#include <algorithm>
 #include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <exception>
 #include <mutex>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 namespace feeler::planner {
+namespace {
+
+/// How far ahead of the first open problem a thread looks for one whose experience is ready.
+constexpr std::size_t kLookAhead = 256;
+
+class Framework {
+ public:
+  Framework(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
+            const PreprocessOptions& options, PolicySink& sink)
+      : task_(task),
+        map_(std::move(map)),
+        family_(family),
+        options_(options),
+        sink_(sink),
+        solver_(options.solver),
+        order_(OrderOf(family, options.order, options.seed)),
+        states_(order_.size()) {
+    solver_.on_bounds = nullptr;
+    solver_.cancellation = options.cancellation;
+    Validate(solver_);
+    needs_experience_ = solver_.solver == SolverKind::kERtdpBel && options.experience != ExperienceKind::kNone;
+  }
+
+  PreprocessSummary Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    summary_.problems = static_cast<std::int64_t>(order_.size());
+    if (!order_.empty()) {
+      tables_ = options_.tables;
+      if (!tables_) tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, family_.problems.front()), solver_);
+      MarkStored();
+      std::vector<std::jthread> threads;
+      for (int i = 1; i < options_.jobs.threads(); ++i) threads.emplace_back([this] { Work(); });
+      Work();
+    }
+    if (failure_) std::rethrow_exception(failure_);
+    summary_.cancelled = Cancelled();
+    summary_.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return summary_;
+  }
+
+ private:
+  enum class Progress { kOpen, kRunning, kSolved, kFailed };
+  struct State {
+    Progress progress = Progress::kOpen;
+    bool stored_before = false;  ///< by an earlier run; the policy is read when it is needed
+    std::shared_ptr<const Policy> policy;
+  };
+
+  const Extents& At(std::size_t k) const { return family_.problems[order_[k]]; }
+  bool Cancelled() const { return options_.cancellation != nullptr && options_.cancellation->cancelled(); }
+
+  void MarkStored() {
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      if (!sink_.Done(At(k))) continue;
+      states_[k].progress = Progress::kSolved;
+      states_[k].stored_before = true;
+      ++summary_.skipped;
+      Advance();
+    }
+  }
+
+  void Advance() {
+    ++done_;
+    if (options_.progress) options_.progress(done_, summary_.problems);
+  }
+
+  /// Algorithm 3, line 6: among the problems before k in the order that are not known to have failed, the one most
+  /// similar in its uncertainty (least difference of extents; of equals the most hypotheses, then the last). The choice
+  /// depends on the order alone, not on how far the threads are. k if there is none.
+  std::size_t MostSimilar(std::size_t k) const {
+    std::size_t best = k;
+    std::tuple<int, int> best_key;
+    for (std::size_t j = 0; j < k; ++j) {
+      if (states_[j].progress == Progress::kFailed) continue;
+      int difference = 0;
+      for (int axis = 0; axis < 3; ++axis) difference += std::abs(At(j)[axis] - At(k)[axis]);
+      const std::tuple<int, int> key(difference, -At(j).Count());
+      if (best == k || key <= best_key) {
+        best = j;
+        best_key = key;
+      }
+    }
+    return best;
+  }
+
+  /// Waits for a problem that can be solved now: the first open one whose experience is ready. Returns false when there
+  /// is nothing left to do.
+  bool Take(std::unique_lock<std::mutex>& lock, std::size_t& taken, std::size_t& similar) {
+    while (true) {
+      if (Cancelled() || failure_) return false;
+      while (first_open_ < order_.size() && states_[first_open_].progress != Progress::kOpen) ++first_open_;
+      if (first_open_ == order_.size()) return false;
+      const std::size_t end = std::min(order_.size(), first_open_ + kLookAhead);
+      for (std::size_t k = first_open_; k < end; ++k) {
+        if (states_[k].progress != Progress::kOpen) continue;
+        similar = needs_experience_ ? MostSimilar(k) : k;
+        if (similar != k && states_[similar].progress != Progress::kSolved) continue;
+        if (similar != k && !states_[similar].policy) {
+          std::optional<Policy> stored = sink_.Load(At(similar));
+          if (!stored) {
+            states_[similar].progress = Progress::kFailed;
+            --k;
+            continue;
+          }
+          states_[similar].policy = std::make_shared<const Policy>(std::move(*stored));
+        }
+        taken = k;
+        states_[k].progress = Progress::kRunning;
+        return true;
+      }
+      changed_.wait(lock);
+    }
+  }
+
+  void Work() {
+    std::unique_lock lock(mutex_);
+    try {
+      std::size_t k = 0;
+      std::size_t similar = 0;
+      while (Take(lock, k, similar)) {
+        const std::shared_ptr<const Policy> policy = similar != k ? states_[similar].policy : nullptr;
+        lock.unlock();
+        const Problem problem = MakeCuboidProblem(task_, map_, At(k));
+        std::optional<Problem> similar_problem;
+        Experience experience;
+        if (policy) {
+          similar_problem = MakeCuboidProblem(task_, map_, At(similar));
+          experience = {options_.experience, &*similar_problem, policy.get()};
+        }
+        SolverResult result = Solve(problem, solver_, tables_, experience);
+        lock.lock();
+        if (result.status == SolverStatus::kCancelled) break;
+        sink_.Store(At(k), problem, result);
+        summary_.cpu_s += result.cpu_s;
+        ++(result.complete() ? summary_.complete : summary_.failed);
+        states_[k].progress = result.complete() ? Progress::kSolved : Progress::kFailed;
+        if (needs_experience_ && result.complete()) {
+          states_[k].policy = std::make_shared<const Policy>(std::move(*result.policy));
+        }
+        Advance();
+        changed_.notify_all();
+      }
+    } catch (...) {
+      if (!lock.owns_lock()) lock.lock();
+      if (!failure_) failure_ = std::current_exception();
+    }
+    changed_.notify_all();
+  }
+
+  const Task& task_;
+  std::shared_ptr<const ContactMap> map_;
+  const ProblemFamily& family_;
+  const PreprocessOptions& options_;
+  PolicySink& sink_;
+  SolverOptions solver_;
+  bool needs_experience_ = false;
+  std::vector<std::size_t> order_;
+  std::vector<State> states_;
+  std::shared_ptr<const PlanningTables> tables_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t first_open_ = 0;
+  std::int64_t done_ = 0;
+  PreprocessSummary summary_;
+  std::exception_ptr failure_;
+};
+
+}  // namespace
 
 PreprocessSummary Preprocess(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
                              const PreprocessOptions& options, PolicySink& sink) {
-  const auto begin = std::chrono::steady_clock::now();
-  PreprocessSummary summary;
-  summary.problems = static_cast<std::int64_t>(family.problems.size());
-  if (family.problems.empty()) return summary;
-  SolverOptions solver = options.solver;
-  solver.on_bounds = nullptr;
-  solver.cancellation = options.cancellation;
-  Validate(solver);
-  const std::vector<std::size_t> order = OrderOf(family, options.order, options.seed);
-  const auto tables = BuildPlanningTables(MakeCuboidProblem(task, map, family.problems.front()), solver);
-  std::mutex mutex;
-  std::size_t next = 0;
-  std::int64_t done = 0;
-  const auto work = [&] {
-    while (true) {
-      Extents extents;
-      {
-        const std::lock_guard lock(mutex);
-        if (next == order.size() || (options.cancellation != nullptr && options.cancellation->cancelled())) return;
-        extents = family.problems[order[next++]];
-        if (sink.Done(extents)) {
-          ++summary.skipped;
-          if (options.progress) options.progress(++done, summary.problems);
-          continue;
-        }
-      }
-      const Problem problem = MakeCuboidProblem(task, map, extents);
-      const SolverResult result = Solve(problem, solver, tables);
-      const std::lock_guard lock(mutex);
-      if (result.status == SolverStatus::kCancelled) return;
-      sink.Store(extents, problem, result);
-      ++(result.complete() ? summary.complete : summary.failed);
-      summary.cpu_s += result.cpu_s;
-      if (options.progress) options.progress(++done, summary.problems);
-    }
-  };
-  std::vector<std::jthread> threads;
-  for (int i = 1; i < options.jobs.threads(); ++i) threads.emplace_back(work);
-  work();
-  threads.clear();
-  summary.cancelled = options.cancellation != nullptr && options.cancellation->cancelled();
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  return summary;
+  return Framework(task, std::move(map), family, options, sink).Run();
 }
 
 }  // namespace feeler::planner

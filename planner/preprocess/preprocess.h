@@ -30,6 +30,8 @@ struct PreprocessOptions {
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
   std::uint64_t seed = 1;                                ///< of the random order
   Parallelism jobs;
+  /// Tables made by an earlier call of BuildPlanningTables for this task and these solver options; null to build them.
+  std::shared_ptr<const PlanningTables> tables;
   const CancellationToken* cancellation = nullptr;  ///< problems in flight are dropped
   ProgressCallback progress;                        ///< problems done, of all
 };

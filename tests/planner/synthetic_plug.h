@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdlib>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -12,11 +13,12 @@ namespace feeler::planner::testing {
 /// A plug-like task without models: the configuration-space obstacle of a plug and a housing is a box of 82 x 66 x 30
 /// mm on a panel, at 2 mm cells, walls at mid-cell. Closed: the box is solid. Open: a hole one cell wide and ten deep
 /// in its middle.
-inline std::shared_ptr<const ContactMap> MakePlugMap(bool open = false) {
-  const CellBox domain{Cell(-42, -38, -18), Cell(42, 38, 34)};
+/// `half`: half extents of the box along x and y, its height along z.
+inline std::shared_ptr<const ContactMap> MakePlugMap(bool open = false, const Cell& half = Cell(20, 16, 15)) {
+  const CellBox domain{-half - Cell(22, 22, 3), half + Cell(22, 22, 19)};
   const auto blocked = [&](const Cell& d) {
-    if (d.z() < -15) return true;  // the panel
-    const bool in_box = d.x() >= -20 && d.x() <= 20 && d.y() >= -16 && d.y() <= 16 && d.z() < 0;
+    if (d.z() < -half.z()) return true;  // the panel
+    const bool in_box = std::abs(d.x()) <= half.x() && std::abs(d.y()) <= half.y() && d.z() < 0;
     const bool in_hole = open && d.x() == 0 && d.y() == 0 && d.z() >= -10;
     return in_box && !in_hole;
   };

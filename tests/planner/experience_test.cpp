@@ -1,0 +1,165 @@
+// Laws of E-RTDP-Bel:
+//  - with an empty experience it is RTDP-Bel, expansion for expansion;
+//  - heur^E of the beliefs of B^E is the fixed point of equation 6, found here by brute force over all pairs; heur^E <=
+//  epsilon heur everywhere;
+//  - heur(b,b') satisfies the triangle inequality and heur(b) <= heur(b,b') + heur(b');
+//  - with any experience the cost is at most epsilon V* (oracle: value iteration, brute_force.h).
+
+#include "planner/solver/experience.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "planner/preprocess/problem_family.h"
+#include "planner/solver/evaluate.h"
+#include "planner/solver/planning_tables.h"
+#include "planner/solver/solve.h"
+#include "tests/planner/brute_force.h"
+#include "tests/planner/random_problems.h"
+#include "tests/planner/synthetic_plug.h"
+
+namespace feeler::planner {
+namespace {
+
+using testing::BruteForce;
+using testing::RandomProblem;
+
+SolverOptions Options(SolverKind solver, double epsilon) {
+  SolverOptions options = PaperSetting(solver, epsilon);
+  options.heuristic = HeuristicKind::kLines;
+  return options;
+}
+
+/// The same problem with its last hypothesis left out: a simpler problem to take experience from.
+LatticeProblemData Simpler(LatticeProblemData data) {
+  data.hypotheses.pop_back();
+  return data;
+}
+
+double Normalised(const BeliefGraph& graph, BeliefId b) { return graph.Heuristic(b) / graph.Weight(b); }
+
+/// Equation 6 by value iteration over all entries and all jumps.
+std::vector<double> FixedPoint(const BeliefGraph& graph, const ExperienceMdp& mdp, double epsilon) {
+  const std::size_t n = mdp.entries.size();
+  std::vector<double> values(n);
+  for (std::size_t i = 0; i < n; ++i) values[i] = epsilon * Normalised(graph, mdp.entries[i].belief);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = 0; i < n; ++i) {
+      double value = values[i];
+      for (std::size_t j = 0; j < n; ++j) {
+        value =
+            std::min(value, epsilon * JumpHeuristic(graph, mdp.entries[i].belief, mdp.entries[j].belief) + values[j]);
+      }
+      if (mdp.entries[i].has_action) {
+        double followed = mdp.entries[i].cost;
+        for (const auto& [next, probability] : mdp.entries[i].branches) followed += probability * values[next];
+        value = std::min(value, followed);
+      }
+      changed = changed || value < values[i] - 1e-13;
+      values[i] = value;
+    }
+  }
+  return values;
+}
+
+TEST(Experience, EmptyExperienceIsRtdpBel) {
+  const Task task = testing::MakePlugTask();
+  const auto map = testing::MakePlugMap(false, {8, 7, 6});
+  const Problem problem = MakeCuboidProblem(task, map, {3, 2, 4});
+  const auto tables = BuildPlanningTables(problem, Options(SolverKind::kRtdpBel, 2.0));
+  const SolverResult plain = Solve(problem, Options(SolverKind::kRtdpBel, 2.0), tables);
+  const SolverResult with = Solve(problem, Options(SolverKind::kERtdpBel, 2.0), tables);
+  ASSERT_TRUE(plain.complete());
+  EXPECT_EQ(plain.expansions, with.expansions);
+  EXPECT_EQ(plain.trials, with.trials);
+  EXPECT_EQ(plain.expected_cost, with.expected_cost);
+  EXPECT_EQ(plain.policy->nodes.size(), with.policy->nodes.size());
+}
+
+TEST(Experience, HeuristicIsTheFixedPoint) {
+  int experiences = 0;
+  for (std::uint64_t index = 0; index < 60; ++index) {
+    const LatticeProblemData data = RandomProblem(7, index, {.three_d = index % 2 == 1});
+    SCOPED_TRACE(data.name);
+    if (data.hypotheses.size() < 3) continue;
+    const Problem simpler = MakeLatticeProblem(Simpler(data));
+    const Problem problem = MakeLatticeProblem(data);
+    const SolverResult solved = Solve(simpler, Options(SolverKind::kRtdpBel, 2.0));
+    if (!solved.complete()) continue;
+    for (const double epsilon : {1.0, 2.0, 5.0}) {
+      for (const bool rollout : {true, false}) {
+        const PlanningTables tables(problem, Options(SolverKind::kERtdpBel, epsilon));
+        BeliefGraph graph(problem, tables.masks(), false);
+        const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+        graph.SetHeuristic(heuristic.get());
+        const ExperienceMdp mdp = rollout ? RollOut(graph, *solved.policy) : Transplant(graph, simpler, *solved.policy);
+        const ExperienceHeuristic experience(graph, mdp, epsilon);
+        const std::vector<double> judge = FixedPoint(graph, mdp, epsilon);
+        for (std::size_t i = 0; i < judge.size(); ++i) EXPECT_NEAR(experience.values()[i], judge[i], 1e-9);
+        // Beliefs outside B^E: successors of its beliefs.
+        for (std::size_t i = 0; i < mdp.entries.size(); ++i) graph.Actions(mdp.entries[i].belief);
+        for (BeliefId b = 0; b < std::min<std::size_t>(graph.size(), 200); ++b) {
+          double equation_7 = epsilon * Normalised(graph, b);
+          EXPECT_LE(experience(b), equation_7 + 1e-9);
+          for (std::size_t i = 0; i < judge.size(); ++i) {
+            equation_7 = std::min(equation_7, epsilon * JumpHeuristic(graph, b, mdp.entries[i].belief) + judge[i]);
+          }
+          EXPECT_LE(experience(b), equation_7 + 1e-9);
+        }
+        ++experiences;
+      }
+    }
+  }
+  EXPECT_GT(experiences, 50);
+}
+
+TEST(Experience, JumpsAreConsistent) {
+  for (std::uint64_t index = 0; index < 10; ++index) {
+    const Problem problem = MakeLatticeProblem(RandomProblem(8, index, {}));
+    const PlanningTables tables(problem, Options(SolverKind::kERtdpBel, 2.0));
+    BeliefGraph graph(problem, tables.masks(), false);
+    const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+    graph.SetHeuristic(heuristic.get());
+    const BeliefId start = graph.Start();
+    if (start == kNoBelief || !std::isfinite(graph.Heuristic(start))) continue;
+    for (BeliefId b = 0; b < graph.size() && graph.size() < 60; ++b) graph.Actions(b);
+    const auto count = static_cast<BeliefId>(std::min<std::size_t>(graph.size(), 60));
+    for (BeliefId a = 0; a < count; ++a) {
+      for (BeliefId b = 0; b < count; ++b) {
+        const double ab = JumpHeuristic(graph, a, b);
+        EXPECT_LE(Normalised(graph, a), ab + Normalised(graph, b) + 1e-9);
+        for (BeliefId c = 0; c < count; ++c) {
+          ASSERT_LE(JumpHeuristic(graph, a, c), ab + JumpHeuristic(graph, b, c) + 1e-9);
+        }
+      }
+    }
+  }
+}
+
+TEST(Experience, CostStaysWithinEpsilon) {
+  for (std::uint64_t index = 0; index < 40; ++index) {
+    const LatticeProblemData data = RandomProblem(9, index, {.three_d = index % 2 == 1, .costs = index % 3 == 0});
+    SCOPED_TRACE(data.name);
+    if (data.hypotheses.size() < 3) continue;
+    const Problem simpler = MakeLatticeProblem(Simpler(data));
+    const Problem problem = MakeLatticeProblem(data);
+    const SolverResult solved = Solve(simpler, Options(SolverKind::kRtdpBel, 3.0));
+    const BruteForce oracle(data);
+    if (!solved.complete() || !oracle.IndistinguishablePairs().empty()) continue;
+    for (const double epsilon : {1.0, 2.0, 5.0}) {
+      for (const ExperienceKind kind : {ExperienceKind::kRollout, ExperienceKind::kNaive}) {
+        const SolverResult result =
+            Solve(problem, Options(SolverKind::kERtdpBel, epsilon), nullptr, {kind, &simpler, &*solved.policy});
+        ASSERT_TRUE(result.complete());
+        EXPECT_EQ(Evaluate(problem, *result.policy).fault, "");
+        EXPECT_LE(result.expected_cost, epsilon * oracle.optimal_cost() + 1e-7);
+        EXPECT_LE(result.lower_bound, oracle.optimal_cost() + 1e-7);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace feeler::planner
