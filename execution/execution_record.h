@@ -11,7 +11,7 @@ namespace feeler::execution {
 
 /// One motion of the tool, in the vocabulary of the episode records.
 struct MoveRecord {
-  std::string kind;       ///< transfer, probe, confirm, retreat, approach, insert
+  std::string kind;       ///< transfer, probe, confirm, fall-in, retreat, approach, insert
   std::string direction;  ///< "+x" ... in the axes of the estimated target frame; empty when not along an axis
   double commanded_m = 0.0;
   /// Least and greatest travel predicted under the hypotheses left (never above commanded_m); empty where nothing was
@@ -40,6 +40,7 @@ struct ExecutionRecord {
   int policy_moves = 0;  ///< guarded moves that the policy asked for (merged ones counted one by one)
   int contacts = 0;      ///< motions that ended at a contact before the insertion
   int grazes = 0;        ///< times an edge was met (or missed) by less than a cell and the lattice shifted
+  bool fell_in = false;  ///< the tool slipped into the opening while it probed, and was localized from inside
   double path_length_m = 0.0;
   double sim_time_s = 0.0;
   double localization_time_s = 0.0;  ///< part of sim_time_s until the insertion began its approach

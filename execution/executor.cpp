@@ -80,13 +80,17 @@ void Run(const Task& task, const planner::Problem& problem, const LatticeFrame& 
     throw ExecutionFailure(fmt::format("start: the tool is {:.2f} mm from the start pose", 1e3 * off * frame.cell_m));
   mover.ZeroWrench();
 
-  Localizer localizer(problem, policy, mover, record);
+  Localizer localizer(task, problem, policy, mover, record);
   const policies::Insert insert = localizer.Run();
   const std::vector<TrackedHypothesis>& left = localizer.hypotheses();
   const int orientation = left.front().hypothesis.orientation;
   std::vector<Touch> evidence = localizer.evidence();
   Eigen::Vector3d target = Mean(left);
-  if (insert.confirm) {
+  if (localizer.found_inside()) {
+    target = *localizer.found_inside();
+    record.fell_in = true;
+    record.localized = true;
+  } else if (insert.confirm) {
     const Hull box = SearchBox(left, HullOf(problem.hypotheses));
     const TargetFit fit = Confirm(*problem.map, task.insertion, orientation, box.lower, box.upper, mover, evidence);
     target = fit.position;

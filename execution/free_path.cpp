@@ -1,7 +1,6 @@
 #include "execution/free_path.h"
 
 #include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "execution/continuous_travel.h"
+#include "execution/fall_in.h"
 
 namespace feeler::execution {
 namespace {
@@ -36,8 +37,9 @@ Touch MakeTouch(Direction direction, double from, const MotionReport& report) {
 
 }  // namespace
 
-Localizer::Localizer(const planner::Problem& problem, policies::Policy& policy, Mover& mover, ExecutionRecord& record)
-    : problem_(problem), policy_(policy), mover_(mover), record_(record), robot_(problem.start) {
+Localizer::Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
+                     ExecutionRecord& record)
+    : task_(task), problem_(problem), policy_(policy), mover_(mover), record_(record), robot_(problem.start) {
   for (const planner::Hypothesis& hypothesis : problem.hypotheses) {
     tracked_.push_back({hypothesis, Eigen::Vector3d::Zero()});
   }
@@ -77,6 +79,7 @@ policies::Insert Localizer::Run() {
       throw ExecutionFailure(fmt::format("limit: {} moves of the policy without a verdict", record_.policy_moves - 1));
     }
     Carry(move);
+    if (found_inside_) return {};
   }
 }
 
@@ -99,6 +102,7 @@ void Localizer::Carry(const GuardedMove& move) {
   const int axis = AxisOf(move.direction);
   const double behind = kept_offset_[axis];
   if (pending_ && *pending_ != move.direction) Flush();
+  if (found_inside_) return;
   kept_offset_[axis] = 0.0;
   const Prediction prediction = Predict(move);
   if (prediction.nearest >= move.cells + mover_.options().free_margin_cells) {
@@ -150,7 +154,10 @@ void Localizer::Flush() {
     const Touch touch = MakeTouch(direction, from, report);
     evidence_.push_back(touch);
     if (!report.contact) break;
-    ShiftOffEdge(touch, direction);
+    // Come off, but not farther back than the motion came.
+    mover_.Retreat(report.end - std::min(0.5, std::max(0.0, touch.travelled)) * UnitVector(direction));
+    if (FoundInside()) return;
+    ShiftOffEdge(touch);
   }
   pending_.reset();
 }
@@ -166,11 +173,10 @@ void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
       if (touch.contact) RetreatFromContact(move.direction);
       return;
     }
-    if (!touch.contact) {
-      const MotionReport report = mover_.Fast(begun, "transfer");
-      if (report.contact) mover_.Retreat(begun);
-    }
-    ShiftOffEdge(touch, move.direction);
+    if (touch.contact) mover_.Retreat(touch.end() - std::min(0.5, touch.travelled) * UnitVector(move.direction));
+    if (FoundInside()) return;
+    mover_.Retreat(begun);  // to where it began, for the other side of the edge
+    ShiftOffEdge(touch);
     now = Predict(move);
   }
 }
@@ -224,18 +230,19 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch) {
   return false;
 }
 
-void Localizer::ShiftOffEdge(const Touch& touch, Direction direction) {
+bool Localizer::FoundInside() {
+  if (!MayHaveFallenIn(task_, problem_, mover_.position())) return false;
+  found_inside_ = LocateFromInside(task_, problem_, mover_);
+  return found_inside_.has_value();
+}
+
+void Localizer::ShiftOffEdge(const Touch& touch) {
   const std::optional<Eigen::Vector3d> shift = GrazeShift(*problem_.map, tracked_, touch, mover_.options().matching);
   if (!shift || record_.grazes >= mover_.options().graze_attempts) FailOffTree(touch);
   ++record_.grazes;
   anchor_ += *shift;
   for (TrackedHypothesis& t : tracked_) t.anchor += *shift;
-  Eigen::Vector3d aside = mover_.position();
-  if (touch.contact) {
-    aside -= 0.5 * UnitVector(direction);
-    mover_.Retreat(aside);
-  }
-  mover_.Retreat(aside + *shift);
+  mover_.Retreat(mover_.position() + *shift);
 }
 
 void Localizer::RetreatFromContact(Direction direction) {

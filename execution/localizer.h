@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/task.h"
 #include "execution/contact_evidence.h"
 #include "execution/mover.h"
 #include "execution/outcome_matching.h"
@@ -21,10 +22,15 @@ namespace feeler::execution {
 class Localizer {
  public:
   /// All arguments outlive the localizer. The tool stands at the start cell of the problem.
-  Localizer(const planner::Problem& problem, policies::Policy& policy, Mover& mover, ExecutionRecord& record);
+  Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
+            ExecutionRecord& record);
 
-  /// Until the policy wants to insert, or one hypothesis is left. Throws ExecutionFailure.
+  /// Until the policy wants to insert, one hypothesis is left, or the tool fell into the opening. Throws
+  /// ExecutionFailure.
   policies::Insert Run();
+
+  /// Set if the tool fell into the opening and felt where it is: the position of the target (lattice coordinates).
+  const std::optional<Eigen::Vector3d>& found_inside() const { return found_inside_; }
 
   const std::vector<TrackedHypothesis>& hypotheses() const { return tracked_; }
   const std::vector<Touch>& evidence() const { return evidence_; }
@@ -51,11 +57,14 @@ class Localizer {
   Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
   /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it.
   bool TakeOver(const GuardedMove& move, const Touch& touch);
+  /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
+  bool FoundInside();
   /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.
-  void ShiftOffEdge(const Touch& touch, Direction direction);
+  void ShiftOffEdge(const Touch& touch);
   void RetreatFromContact(Direction direction);
   [[noreturn]] void FailOffTree(const Touch& touch) const;
 
+  const Task& task_;
   const planner::Problem& problem_;
   policies::Policy& policy_;
   Mover& mover_;
@@ -65,7 +74,8 @@ class Localizer {
   Cell robot_;
   Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
-  std::optional<Direction> pending_;                       ///< the tool still has to go this way to Station()
+  std::optional<Eigen::Vector3d> found_inside_;
+  std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()
 };
 
 }  // namespace feeler::execution

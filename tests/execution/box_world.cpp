@@ -18,7 +18,7 @@ double EntryDistance(const Box& box, const Eigen::Vector3d& from, const Eigen::V
   double enter = -kNever;
   double leave = kNever;
   for (int axis = 0; axis < 3; ++axis) {
-    if (std::abs(direction[axis]) < 1e-3) {
+    if (std::abs(direction[axis]) < 0.1) {  // across; what noise adds to a motion along an axis does not count
       if (from[axis] <= box.min[axis] + slip || from[axis] >= box.max[axis] - slip) return kNever;
       continue;
     }
@@ -28,10 +28,26 @@ double EntryDistance(const Box& box, const Eigen::Vector3d& from, const Eigen::V
     enter = std::max(enter, a);
     leave = std::min(leave, b);
   }
-  // A point a little inside a wall, as after a contact, is at it.
-  constexpr double kAtWall = 0.0008;
-  if (enter >= leave || enter < -kAtWall) return kNever;
-  return std::max(0.0, enter);
+  constexpr double kAtWall = 1e-6;  // a point pushed out of a wall is on it
+  return enter >= leave || enter < -kAtWall ? kNever : std::max(0.0, enter);
+}
+
+/// A point a little inside a box is pushed out through the nearest face.
+void PushOut(const std::vector<Box>& boxes, Eigen::Vector3d& at) {
+  constexpr double kDeepest = 0.0006;
+  for (const Box& box : boxes) {
+    const Eigen::Vector3d above = at - box.min;
+    const Eigen::Vector3d below = box.max - at;
+    const double depth = std::min(above.minCoeff(), below.minCoeff());
+    if (depth <= 0.0 || depth > kDeepest) continue;
+    int axis = 0;
+    if (below.minCoeff(&axis) <= above.minCoeff()) {
+      at[axis] = box.max[axis];
+    } else {
+      above.minCoeff(&axis);
+      at[axis] = box.min[axis];
+    }
+  }
 }
 
 double Distance(const std::vector<Box>& boxes, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
@@ -44,7 +60,7 @@ double Distance(const std::vector<Box>& boxes, const Eigen::Vector3d& from, cons
 }  // namespace
 
 std::vector<Box> HousingOverPanel() {
-  return {{{-0.041, -0.033, -0.030}, {0.041, 0.033, 0.0}}, {{-1.0, -1.0, -1.0}, {1.0, 1.0, -0.030}}};
+  return {{{-0.041, -0.033, -0.030}, {0.041, 0.033, 0.0}}, {{-10.0, -10.0, -1.0}, {10.0, 10.0, -0.030}}};
 }
 
 double DistanceToContact(const std::vector<Box>& boxes, const Eigen::Vector3d& from, const Eigen::Vector3d& direction) {
@@ -96,7 +112,7 @@ Task HousingTask() {
 
 std::shared_ptr<const planner::ContactMap> HousingMap() {
   static const std::shared_ptr<const planner::ContactMap> kMap =
-      MapOf(HousingOverPanel(), 0.002, {0.0, 0.0, 0.5}, {Cell(-24, -20, -18), Cell(24, 20, 3)});
+      MapOf(HousingOverPanel(), 0.002, {0.0, 0.0, 0.5}, {Cell(-42, -38, -18), Cell(42, 38, 34)});
   return kMap;
 }
 
@@ -113,6 +129,11 @@ Eigen::Vector3d KinematicRobot::Displacement(const Eigen::Vector3d& world_m) con
   return world_T_target_.linear().transpose() * (world_m - world_T_target_.translation());
 }
 
+bool KinematicRobot::InOpening(const Eigen::Vector3d& at) const {
+  return at.z() < 0.0 && at.z() > -task_.insertion_depth_m - 0.001 &&
+         std::max(std::abs(at.x()), std::abs(at.y())) < kClearance + kChamfer;
+}
+
 Pose KinematicRobot::ToolPose() const { return world_T_tool_; }
 
 MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched) {
@@ -124,11 +145,22 @@ MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_
   const double weak = random_.Uniform(faults_.weakest_m, faults_.strongest_m);
   const double slip = random_.Uniform(0.0, faults_.slip_m);
   Eigen::Vector3d end = to_world_m;
-  if (length > 1e-9) {
+  if (watched && length > 1e-9 && pressing_.norm() > 0.5 && pressing_.dot(motion / length) > -0.3) {
+    result.contact = true;  // it never came off the wall
+    end = from;
+  } else if (length > 1e-9) {
+    pressing_.setZero();
     const Eigen::Vector3d direction = motion / length;
     const Eigen::Vector3d local = world_T_target_.linear().transpose() * direction;
     const Eigen::Vector3d at = Displacement(from);
     double free = Distance(boxes_, at, local, slip);
+    if (InOpening(at) && at.z() < -0.001) {
+      free = std::numeric_limits<double>::infinity();
+      int axis = 0;
+      local.cwiseAbs().maxCoeff(&axis);
+      if (local.z() < -0.9) free = std::max(0.0, at.z() + task_.insertion_depth_m);
+      if (axis < 2) free = std::max(0.0, kClearance - (local[axis] > 0 ? at[axis] : -at[axis]));
+    }
     const Eigen::Vector3d wall = at + std::min(free, length) * local;
     const double lateral = std::max(std::abs(wall.x()), std::abs(wall.y()));
     if (local.z() < -0.99 && std::abs(wall.z()) < 1e-6) {  // over the opening
@@ -141,12 +173,18 @@ MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_
     if (free < length) {
       const double depth = length - free;
       result.contact = watched && depth > weak;
+      if (result.contact) pressing_ = direction;
       const double late = result.contact ? random_.Uniform(0.0, speed_m_s * faults_.stop_s) : faults_.give * depth;
       end = from + (free + std::min(late, depth)) * direction;
       result.peak_force_n = 10.0;
     }
   }
   for (int axis = 0; axis < 3; ++axis) end[axis] += Noise(faults_.tracking_m);
+  if (!InOpening(Displacement(end))) {
+    Eigen::Vector3d at = Displacement(end);
+    PushOut(boxes_, at);
+    end = world_T_target_ * at;
+  }
   world_T_tool_.translation() = end;
   result.reason = result.contact ? StopReason::kContact : StopReason::kReached;
   result.travelled_m = length > 0.0 ? (end - from).dot(motion) / length : 0.0;

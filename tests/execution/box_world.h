@@ -66,6 +66,7 @@ class KinematicRobot : public Robot {
  private:
   MotionResult Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
   Eigen::Vector3d Displacement(const Eigen::Vector3d& world_m) const;
+  bool InOpening(const Eigen::Vector3d& displacement_m) const;
   double Noise(double sigma) { return sigma * random_.Normal(); }
 
   std::vector<Box> boxes_;
@@ -76,6 +77,7 @@ class KinematicRobot : public Robot {
   RandomStream random_;
   double time_s_ = 0.0;
   bool inserted_ = false;
+  Eigen::Vector3d pressing_ = Eigen::Vector3d::Zero();  ///< direction of the motion that ended at a felt contact
 };
 
 }  // namespace feeler::execution

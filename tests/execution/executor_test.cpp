@@ -26,8 +26,9 @@ namespace feeler::execution {
 namespace {
 
 std::shared_ptr<const planner::Policy> PolicyFor(const planner::Problem& problem) {
-  const planner::SolverResult result =
-      planner::Solve(problem, planner::FastSetting(planner::SolverKind::kRtdpBel, 1.2));
+  const planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kRtdpBel, 1.2);
+  static const auto tables = planner::BuildPlanningTables(problem, options);  // shared: one map, one set of costs
+  const planner::SolverResult result = planner::Solve(problem, options, tables);
   if (!result.policy) return nullptr;
   return std::make_shared<planner::Policy>(*result.policy);
 }
@@ -36,6 +37,7 @@ struct Episode {
   ExecutionRecord record;
   Eigen::Vector3d error_m = Eigen::Vector3d::Zero();  ///< estimate minus truth, in target axes
   bool inserted = false;                              ///< in truth
+  Eigen::Vector3d truth = Eigen::Vector3d::Zero();    ///< from the estimate, in cells
 };
 
 Pose TruePose(const planner::Problem& problem, const Task& task, const Pose& world_T_estimate, RandomStream& random) {
@@ -62,6 +64,7 @@ Episode RunEpisode(const planner::Problem& problem, std::shared_ptr<const planne
   Episode episode;
   episode.record = Execute(task, problem, world_T_estimate, policy, robot, options);
   episode.inserted = robot.Inserted();
+  episode.truth = world_T_estimate.inverse() * truth.translation() / task.cell_m;
   if (episode.record.world_T_estimate) {
     episode.error_m =
         truth.linear().transpose() * (episode.record.world_T_estimate->translation() - truth.translation());
@@ -100,7 +103,7 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
   const char* scale_text = std::getenv("FEELER_EXECUTOR_EPISODES");  // to run more of them by hand
   const int episodes = scale_text ? std::atoi(scale_text) : GetParam().episodes;
   int failed = 0;
-  double moves = 0, probes = 0, contacts = 0, seconds = 0, grazes = 0, length = 0, policy_moves = 0;
+  double moves = 0, probes = 0, contacts = 0, seconds = 0, grazes = 0, fell_in = 0, length = 0, policy_moves = 0;
   std::vector<double> lateral;
   std::map<std::string, int> reasons;
   for (int i = 0; i < episodes; ++i) {
@@ -113,7 +116,8 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
                       std::abs(episode.error_m.z()) <= task.tolerance.vertical_m;
     if (!good) {
       if (++failed <= 3) {
-        ADD_FAILURE() << "episode " << i << " error mm " << 1e3 * episode.error_m.transpose() << " " << Trace(record);
+        ADD_FAILURE() << "episode " << i << " truth " << episode.truth.transpose() << " error mm "
+                      << 1e3 * episode.error_m.transpose() << " " << Trace(record);
       }
       continue;
     }
@@ -129,6 +133,7 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
     contacts += record.contacts;
     seconds += record.sim_time_s;
     grazes += record.grazes;
+    fell_in += record.fell_in;
     length += record.path_length_m;
   }
   EXPECT_EQ(failed, 0) << "of " << episodes;
@@ -136,10 +141,11 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
   if (lateral.empty()) return;
   const double n = static_cast<double>(lateral.size());
   fmt::print(
-      "{}: {} of {} good; motions {:.1f} policy moves {:.1f} probes {:.1f} contacts {:.1f} grazes {:.3f} "
+      "{}: {} of {} good; motions {:.1f} policy moves {:.1f} probes {:.1f} contacts {:.1f} grazes {:.3f} fell in "
+      "{:.3f} "
       "path {:.0f} mm time {:.2f} s; lateral error p50 {:.3f} p95 {:.3f} max {:.3f} mm\n",
       planner::ToString(GetParam().extents), lateral.size(), episodes, moves / n, policy_moves / n, probes / n,
-      contacts / n, grazes / n, 1e3 * length / n, seconds / n, 1e3 * lateral[lateral.size() / 2],
+      contacts / n, grazes / n, fell_in / n, 1e3 * length / n, seconds / n, 1e3 * lateral[lateral.size() / 2],
       1e3 * lateral[static_cast<std::size_t>(0.95 * (n - 1))], 1e3 * lateral.back());
 }
 

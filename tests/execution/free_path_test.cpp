@@ -18,7 +18,7 @@ TEST(FindFreePath, KeepsClearOfTheHousing) {
     const auto draw = [&] {
       Cell cell;
       do {
-        cell = Cell(int(random.Index(49)) - 24, int(random.Index(41)) - 20, int(random.Index(20)) - 14);
+        cell = Cell(int(random.Index(59)) - 29, int(random.Index(51)) - 25, int(random.Index(20)) - 14);
       } while (!IsClear(*map, cell));
       return cell;
     };

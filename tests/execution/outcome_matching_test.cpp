@@ -27,7 +27,7 @@ TEST(OutcomeMatching, BestMatchIsTheNearestHypothesis) {
   const auto map = HousingMap();
   const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), map, {5, 5, 5});
   int contacts = 0;
-  for (std::uint64_t episode = 0; episode < 500; ++episode) {
+  for (std::uint64_t episode = 0; episode < 2000; ++episode) {
     RandomStream random(7, episode, "matching");
     Eigen::Vector3d truth;
     for (int axis = 0; axis < 3; ++axis) truth[axis] = random.Uniform(-0.499, 4.499);
