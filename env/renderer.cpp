@@ -188,17 +188,17 @@ CameraModel Renderer::Model(mjData& data, const Camera& camera) {
 FreeCamera OverviewCamera(const Scene& scene) {
   const Eigen::Vector3d target = scene.task.world_T_target.translation();
   FreeCamera camera;
-  camera.look_at_m = Eigen::Vector3d(0.5 * target.x(), 0.5 * target.y(), 0.36);
-  camera.distance_m = 2.05;
-  camera.azimuth_deg = 128.0;
-  camera.elevation_deg = -17.0;
+  camera.look_at_m = Eigen::Vector3d(0.55 * target.x(), 0.5 * target.y(), 0.34);
+  camera.distance_m = 1.6;
+  camera.azimuth_deg = 125.0;
+  camera.elevation_deg = -16.0;
   return camera;
 }
 
 FreeCamera CloseUpCamera(const Scene& scene) {
   FreeCamera camera;
-  camera.look_at_m = scene.task.world_T_target * Eigen::Vector3d(0.0, 0.0, 0.022);
-  camera.distance_m = 0.34;
+  camera.look_at_m = scene.task.world_T_target * Eigen::Vector3d(0.0, 0.0, 0.025);
+  camera.distance_m = 0.3;
   camera.azimuth_deg = 128.0;
   camera.elevation_deg = -24.0;
   return camera;

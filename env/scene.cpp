@@ -87,7 +87,7 @@ void Parse(const std::string& xml, const std::string& where, TaskDocument& task)
 // What the scene decides leaves the task's text: key frames fit the task's own qpos only, and of two settings in
 // different sections MuJoCo would take the last.
 void DropGlobalSettings(XMLElement& mujoco) {
-  for (const char* section : {"keyframe", "option", "size"}) {
+  for (const char* section : {"keyframe", "option", "size", "statistic"}) {
     while (XMLElement* element = mujoco.FirstChildElement(section)) mujoco.DeleteChild(element);
   }
 }

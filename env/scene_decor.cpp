@@ -82,8 +82,7 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
        {"texrepeat", "2 2"},
        {"texuniform", "true"},
        {"specular", "0.1"},
-       {"shininess", "0.1"},
-       {"reflectance", "0.06"}});
+       {"shininess", "0.1"}});
   if (!HasSky(mujoco)) {
     Add(asset, "texture",
         {{"name", "sky"},
@@ -98,8 +97,11 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
   XMLElement& visual = *mujoco.InsertNewChildElement("visual");
   Add(visual, "global", {{"offwidth", "1920"}, {"offheight", "1200"}});
   Add(visual, "headlight", {{"ambient", "0.30 0.30 0.30"}, {"diffuse", "0.28 0.28 0.28"}, {"specular", "0.1 0.1 0.1"}});
-  Add(visual, "quality", {{"shadowsize", "4096"}, {"offsamples", "4"}});
+  Add(visual, "quality", {{"shadowsize", "2048"}, {"offsamples", "4"}});
   Add(visual, "map", {{"znear", "0.01"}, {"zfar", "40"}});
+
+  // The region that shadows cover and the unit of the near and far planes.
+  Add(mujoco, "statistic", {{"center", "0.45 0 0.3"}, {"extent", "1"}});
 
   XMLElement& worldbody = *mujoco.FirstChildElement("worldbody");
   const Furniture furniture = FurnitureOf(worldbody);
