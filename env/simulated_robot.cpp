@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "planner/transfer/time_parametrization.h"
 
 namespace feeler::env {
 namespace {
@@ -51,6 +52,8 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
   RequirePose(world_T_target, "reset");
   world_.Reset(q_rad, world_T_target, noise.joint_friction_nm);
   noise_ = noise;
+  target_candidates_ = {world_.scene().task.world_T_target};
+  transfer_seed_ = random.Next();
   for (int i = 0; i < kJointCount; ++i) {
     encoder_offset_[i] = noise.encoder_noise_rad > 0 ? noise.encoder_noise_rad * random.Normal() : 0.0;
   }
@@ -63,6 +66,12 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
   peak_force_n_ = 0.0;
   deadline_s_ = std::numeric_limits<double>::infinity();
   next_observation_s_ = 0.0;
+}
+
+void SimulatedRobot::SetTargetCandidates(std::vector<Pose> world_T_target) {
+  if (world_T_target.empty()) throw InputError("target candidates", "none given", "give at least one pose");
+  for (const Pose& pose : world_T_target) RequirePose(pose, "target candidates");
+  target_candidates_ = std::move(world_T_target);
 }
 
 void SimulatedRobot::SetObserver(std::function<void(const World&)> observer, double period_s) {
@@ -291,35 +300,51 @@ MotionResult SimulatedRobot::LinearMove(const Pose& world_T_tool, double speed_m
   });
 }
 
+std::vector<Eigen::VectorXd> SimulatedRobot::PlanWay(const Pose& world_T_tool, std::string& reason) {
+  const JointVector start = q_rad();
+  if (options_.transfer_planner) {
+    const std::vector<JointVector> way = options_.transfer_planner(world_, start, world_T_tool);
+    if (way.empty()) reason = "no collision-free way was found";
+    return {way.begin(), way.end()};
+  }
+  const Scene& scene = world_.scene();
+  if (!transfer_checker_) transfer_checker_ = std::make_unique<TransferChecker>(scene, options_.transfer.clearance_m);
+  transfer_checker_->SetTargetPoses(target_candidates_);
+  TransferSettings settings = options_.transfer;
+  settings.seed = transfer_seed_;
+  planner::TransferPlan plan = PlanTransfer(*transfer_checker_, scene, start, world_T_tool, settings);
+  reason = plan.reason;
+  return plan.way_points;
+}
+
 MotionResult SimulatedRobot::Transfer(const Pose& world_T_tool) {
   RequirePose(world_T_tool, "transfer");
   return Guard([&] {
     MotionResult result;
-    const JointVector start = q_rad();
-    std::vector<JointVector> way_points;
-    if (options_.transfer_planner) way_points = options_.transfer_planner(world_, start, world_T_tool);
+    const Scene& scene = world_.scene();
+    const std::vector<Eigen::VectorXd> way_points = PlanWay(world_T_tool, result.detail);
     if (way_points.empty()) {
       result.reason = StopReason::kUnplanned;
-      result.detail = "no collision-free way was found";
       result.world_T_tool = ToolPose();
       return result;
     }
-    way_points.front() = start;
-    // The end exactly at the goal, whatever the planner's own accuracy.
-    JointVector end = way_points.back();
-    if (SolveNearby(world_.scene(), world_T_tool, end, 0.01)) way_points.back() = end;
-    JointLimits limits;
-    limits.velocity_rad_s = options_.joint_speed_fraction * world_.scene().velocity_limit_rad_s;
-    limits.acceleration_rad_s2.setConstant(options_.joint_acceleration_rad_s2);
-    const JointPathTrajectory trajectory(std::move(way_points), limits);
+    planner::MotionLimits limits;
+    limits.velocity_rad_s = options_.joint_speed_fraction * scene.velocity_limit_rad_s;
+    limits.acceleration_rad_s2 = JointVector::Constant(options_.joint_acceleration_rad_s2);
+    planner::TimeParametrizationOptions timing;
+    timing.reach_m = JointVector::Constant(1.5);  // no point of arm and tool is farther from a joint
+    const planner::JointTrajectory trajectory = planner::Parametrize(way_points, limits, timing);
     set_point_.reset();
     held_orientation_ = world_T_tool.linear();
     Watch watch;
     watch.tool_force_n = options_.transfer_contact_force_n;
     watch.protective = true;
     const double path_before_m = statistics_.path_length_m;
-    result = Follow(
-        trajectory.duration_s(), [&](double t) { return std::optional(trajectory.At(t)); }, watch, true);
+    const auto reference_at = [&](double t) -> std::optional<JointReference> {
+      const planner::JointState state = trajectory.Sample(t);
+      return JointReference{state.q_rad, state.qd_rad_s, state.qdd_rad_s2};
+    };
+    result = Follow(trajectory.duration_s(), reference_at, watch, true);
     result.travelled_m = statistics_.path_length_m - path_before_m;
     return result;
   });

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -11,11 +12,11 @@
 #include "core/robot.h"
 #include "env/control/impedance.h"
 #include "env/control/joint_control.h"
-#include "env/control/joint_path.h"
 #include "env/control/trajectory.h"
 #include "env/scene.h"
 #include "env/sensing/contact_sensor.h"
 #include "env/sensing/noise.h"
+#include "env/transfer_checker.h"
 #include "env/world.h"
 
 namespace feeler::env {
@@ -40,7 +41,8 @@ struct RobotOptions {
   double settle_time_limit_s = 0.1;        ///< or after this time
   double zeroing_time_s = 0.02;            ///< the wrench is averaged over this time to find its zero
   double compliant_reach_m = 1e-3;         ///< a compliant motion that ends this close to its goal has reached it
-  TransferPlanner transfer_planner;        ///< without one every transfer is unplanned
+  TransferSettings transfer;               ///< the seed in it is replaced by one drawn at reset
+  TransferPlanner transfer_planner;        ///< in place of PlanTransfer with the settings above
 };
 
 /// What an episode has used up so far.
@@ -93,6 +95,9 @@ class SimulatedRobot : public Robot {
   const RobotStatistics& statistics() const { return statistics_; }
   const RobotOptions& options() const { return options_; }
 
+  /// Where the target may stand, as far as the robot knows: transfers keep clear of all of these. At least one; the
+  /// nominal pose after a reset.
+  void SetTargetCandidates(std::vector<Pose> world_T_target);
   /// Motions end with kTimeLimit once Time() reaches it.
   void SetDeadline(double time_s) { deadline_s_ = time_s; }
   /// `observer` sees the world every `period_s` of simulated time (frames of a video); empty: nobody does.
@@ -110,6 +115,8 @@ class SimulatedRobot : public Robot {
   MotionResult Follow(double duration_s, const ReferenceAt& reference_at, const Watch& watch, bool settle);
   /// Holds the joints where they are until they rest.
   void Hold(MotionResult& result);
+  /// The way points of a transfer; empty, with the reason, when there are none.
+  std::vector<Eigen::VectorXd> PlanWay(const Pose& world_T_tool, std::string& reason);
   void TrackStep(const JointReference& reference);
   void StepOnce(const JointVector& torque_nm);
   bool IsContact(const Watch& watch, bool& released) const;
@@ -125,6 +132,9 @@ class SimulatedRobot : public Robot {
   ContactSensor sensor_;
   FrictionObserver friction_;
   RobotStatistics statistics_;
+  std::vector<Pose> target_candidates_;
+  std::uint64_t transfer_seed_ = 0;
+  std::unique_ptr<TransferChecker> transfer_checker_;  ///< made when first needed
   JointVector encoder_offset_ = JointVector::Zero();
   Eigen::Matrix3d held_orientation_ = Eigen::Matrix3d::Identity();  ///< what guarded moves hold
   std::optional<Pose> set_point_;                                   ///< of Servo

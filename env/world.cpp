@@ -165,6 +165,9 @@ void World::Restore(const WorldState& s) {
       !fits(s.mocap_pos, 3 * model_->nmocap) || !fits(s.mocap_quat, 4 * model_->nmocap)) {
     throw InputError("restore", "the state belongs to another model", "restore only what this scene saved");
   }
+  if (!AllBelow(s.qpos.data(), model_->nq, kAbsurdVelocity) || !AllBelow(s.qvel.data(), model_->nv, kAbsurdVelocity)) {
+    throw InputError("restore", "the state holds absurd positions or velocities", "restore only what this scene saved");
+  }
   mj_resetData(model_.get(), data_.get());
   failure_.clear();
   data_->time = s.time_s;

@@ -31,7 +31,10 @@ JointVector CartesianImpedance(const World& world, const JointVector& q_rad, con
     const double damping = 2 * gains.damping_ratio * std::sqrt(stiffness[i] / std::max(mobility(i, i), 1e-6));
     wrench[i] = stiffness[i] * local_error[i] + damping * local_twist[i];
   }
-  return tool_jacobian.transpose() * wrench + world.BiasTorque();
+  // Without the inertia the coupling between the axes throws the tool sideways whenever the reference speeds up or
+  // stops.
+  const JointVector acceleration = jacobian.partialPivLu().solve(reference.acceleration);
+  return tool_jacobian.transpose() * wrench + world.InertiaTimes(acceleration) + world.BiasTorque();
 }
 
 }  // namespace feeler::env

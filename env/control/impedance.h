@@ -15,7 +15,8 @@ struct ImpedanceGains {
   double damping_ratio = 1.0;
 };
 
-/// Cartesian impedance without inertia shaping (Hogan 1985): J^T (K error + D velocity error) + bias. D is the critical
+/// Cartesian impedance without inertia shaping (Hogan 1985): J^T (K error + D velocity error) + M J^-1 reference
+/// acceleration + bias. D is the critical
 /// damping of each tool axis on its own, from the inertia the arm shows along it at present.
 JointVector CartesianImpedance(const World& world, const JointVector& q_rad, const JointVector& qd_rad_s,
                                const PosePoint& reference, const ImpedanceGains& gains);

@@ -8,17 +8,38 @@
 namespace feeler::env {
 namespace {
 
+double AngleBetween(const Pose& a, const Pose& b) {
+  return Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle();
+}
+
+double SecondsAtFullPace(const Pose& a, const Pose& b, const CartesianLimits& limits) {
+  return std::max((b.translation() - a.translation()).norm() / limits.speed_m_s,
+                  AngleBetween(a, b) / limits.angular_speed_rad_s);
+}
+
 std::vector<double> PaceOf(const std::vector<Pose>& way_points, const CartesianLimits& limits) {
   assert(!way_points.empty());
   std::vector<double> end(way_points.size(), 0.0);
   for (std::size_t i = 1; i < way_points.size(); ++i) {
-    const Pose& a = way_points[i - 1];
-    const Pose& b = way_points[i];
-    const double distance_m = (b.translation() - a.translation()).norm();
-    const double angle_rad = Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle();
-    end[i] = end[i - 1] + std::max(distance_m / limits.speed_m_s, angle_rad / limits.angular_speed_rad_s);
+    end[i] = end[i - 1] + SecondsAtFullPace(way_points[i - 1], way_points[i], limits);
   }
   return end;
+}
+
+// How fast the pace may change: the fastest linear and angular motion on the way decide, each by its own limit.
+double PaceChange(const std::vector<Pose>& way_points, const CartesianLimits& limits) {
+  double change = 1e9;
+  for (std::size_t i = 1; i < way_points.size(); ++i) {
+    const Pose& a = way_points[i - 1];
+    const Pose& b = way_points[i];
+    const double span_s = SecondsAtFullPace(a, b, limits);
+    if (span_s == 0) continue;
+    const double speed = (b.translation() - a.translation()).norm() / span_s;
+    const double angular_speed = AngleBetween(a, b) / span_s;
+    if (speed > 0) change = std::min(change, limits.acceleration_m_s2 / speed);
+    if (angular_speed > 0) change = std::min(change, limits.angular_acceleration_rad_s2 / angular_speed);
+  }
+  return change;
 }
 
 }  // namespace
@@ -49,9 +70,7 @@ ProfilePoint TrapezoidalProfile::At(double time_s) const {
 PoseTrajectory::PoseTrajectory(std::vector<Pose> way_points, const CartesianLimits& limits)
     : way_points_(std::move(way_points)),
       pace_end_(PaceOf(way_points_, limits)),
-      profile_(pace_end_.back(), 1.0,
-               std::min(limits.acceleration_m_s2 / limits.speed_m_s,
-                        limits.angular_acceleration_rad_s2 / limits.angular_speed_rad_s)) {}
+      profile_(pace_end_.back(), 1.0, PaceChange(way_points_, limits)) {}
 
 PoseTrajectory PoseTrajectory::Slowed(double factor) const {
   assert(factor >= 1);

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/pose.h"
+#include "core/random.h"
+#include "core/robot.h"
+#include "core/task.h"
+#include "env/insertion_judge.h"
+#include "env/scene.h"
+#include "env/simulated_robot.h"
+
+namespace feeler::env {
+
+/// A straight guarded motion in world axes.
+struct GuardedMoveAction {
+  GuardedMotion motion;
+};
+/// Free motion to a pose: around obstacles, or, if `straight`, along a line and watched for contact.
+struct TransferAction {
+  Pose world_T_tool = Pose::Identity();
+  bool straight = false;
+  double speed_m_s = 0.25;        ///< if straight
+  double contact_force_n = 10.0;  ///< if straight
+};
+/// Compliant motion along the insertion direction of the estimated target, from where the tool is.
+struct InsertAction {
+  double distance_m = 0.02;
+  double speed_m_s = 0.02;
+  double force_limit_n = 60.0;
+  double time_limit_s = 10.0;
+};
+/// For learners: moves the set point of the compliant tool by `delta` and simulates `steps` milliseconds.
+struct LowLevelAction {
+  Vector6 delta = Vector6::Zero();  ///< m and rad in world axes, linear first
+  int steps = 1;
+};
+using Action = std::variant<GuardedMoveAction, TransferAction, InsertAction, LowLevelAction>;
+
+/// What an action may ask for; more is an InputError.
+struct ActionBounds {
+  double distance_m = 1.0;
+  double speed_m_s = 0.5;
+  double force_n = 250.0;
+  double delta_m = 0.005;
+  double delta_rad = 0.02;
+  int steps = 1000;
+};
+
+/// What a policy may see. SI units, world axes, as measured (noise included).
+struct Observation {
+  JointVector q_rad = JointVector::Zero();
+  JointVector qd_rad_s = JointVector::Zero();
+  Pose world_T_tool = Pose::Identity();
+  Wrench raw_wrench;
+  Wrench filtered_wrench;
+  bool contact = false;      ///< the last action met contact
+  double travelled_m = 0.0;  ///< by the last action
+};
+
+struct Info {
+  std::array<bool, kContactPairCount> contact_pairs{};  ///< by ContactPair, with hysteresis
+  StopReason stop_reason = StopReason::kReached;        ///< of the last action
+  std::string detail;                                   ///< for people, e.g. why the world failed
+  double action_peak_force_n = 0.0;                     ///< measured, in the last action
+  double peak_force_n = 0.0;                            ///< exact, in the episode
+  double sim_time_s = 0.0;
+  double path_length_m = 0.0;
+  Pose world_T_estimate = Pose::Identity();  ///< where the target is believed to be
+  std::optional<Pose> world_T_target;        ///< the truth, for scoring only; absent if withheld
+  bool inserted = false;
+  InsertionReason insertion_reason = InsertionReason::kTooShallow;
+};
+
+struct StepResult {
+  Observation observation;
+  double reward = 0.0;
+  bool terminated = false;  ///< inserted, or something broke (force, unstable physics)
+  bool truncated = false;   ///< the time limit passed; independent of `terminated`
+  Info info;
+};
+
+enum class StartPlace { kStartPose, kHome };
+
+/// What may differ from episode to episode.
+struct EpisodeOptions {
+  std::uint64_t episode = 0;             ///< with the seed, keys every random draw
+  std::optional<Pose> world_T_estimate;  ///< default: as the task file places the target
+  std::optional<Pose> world_T_target;    ///< default: drawn around the estimate
+  std::vector<int> extents;              ///< hypotheses per axis of the task; default: its largest
+  NoiseOptions noise;
+  StartPlace start = StartPlace::kStartPose;
+  bool withhold_true_pose = false;  ///< all else is the same, bit for bit
+};
+
+struct EnvOptions {
+  RobotOptions robot;
+  ActionBounds bounds;
+  std::optional<InsertionLimits> limits;  ///< default: the task's; its time limit truncates the episode
+  double reward_per_second = 0.0;         ///< added for every simulated second: negative to favour haste
+};
+
+/// A pose around the estimate, uniform in the box of hypotheses of these extents (one per axis of the task): positions
+/// over the lattice span plus half a cell each side, angles over the lattice span; all in axes of the estimated target,
+/// angles about its origin (yaw about z, pitch about y).
+/// Throws InputError when the extents do not fit the task's axes.
+Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents,
+                  RandomStream& random);
+
+/// Where the tool begins: the start offset from the estimate, axes aligned.
+Pose StartPose(const Task& task, const Pose& world_T_estimate);
+
+/// Gymnasium's contract: Reset begins an episode, Step carries one action out. Reward: 1 when an action inserts the
+/// tool, and reward_per_second * seconds. An action that is not valid throws InputError and changes nothing; so does
+/// Step before Reset or after the end of the episode. Same seed and options: the same episode, bit for bit, whatever
+/// ran before.
+///
+/// An executor written for any Robot drives `robot()` instead of Step, and asks `Judge` when it is done.
+/// One thread at a time; any number of environments share a scene.
+class InsertionEnv {
+ public:
+  explicit InsertionEnv(std::shared_ptr<const Scene> scene, const EnvOptions& options = {});
+
+  /// Throws InputError when the start pose is out of reach or in collision, or an option makes no sense; the
+  /// environment then waits for a better Reset.
+  StepResult Reset(std::uint64_t seed, const EpisodeOptions& options = {});
+  StepResult Step(const Action& action);
+
+  /// The truth of the present instant.
+  InsertionVerdict Judge() const;
+
+  SimulatedRobot& robot() { return robot_; }
+  const SimulatedRobot& robot() const { return robot_; }
+  const Task& task() const { return robot_.world().scene().task; }
+  const Pose& world_T_estimate() const { return estimate_; }
+  const InsertionLimits& limits() const { return limits_; }
+
+ private:
+  void PlaceRobot(const Pose& world_T_target, const EpisodeOptions& options, const RandomStream& random);
+  void RequireValid(const Action& action) const;
+  StepResult Result(const MotionResult& motion) const;
+
+  EnvOptions options_;
+  SimulatedRobot robot_;
+  InsertionLimits limits_;
+  Pose estimate_ = Pose::Identity();
+  bool withhold_true_pose_ = false;
+  bool running_ = false;
+};
+
+}  // namespace feeler::env
