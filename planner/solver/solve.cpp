@@ -1,7 +1,6 @@
 #include "planner/solver/solve.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "planner/solver/bounded_search.h"
 #include "planner/solver/experience.h"
 #include "planner/solver/freeze_policy.h"
+#include "planner/solver/greedy_completion.h"
 #include "planner/solver/indistinguishable.h"
 #include "planner/solver/planning_tables.h"
 #include "planner/solver/rtdp_bel.h"
@@ -89,67 +89,52 @@ class Attempt {
     }
   }
 
-  /// A first policy by inflated RTDP-Bel, then BoundedSearch until the gap is closed. How much inflation finds a policy
-  /// fast depends on how tight the heuristic is, so several take turns with growing budgets.
+  /// A first policy by inflated RTDP-Bel, which is good and fast where the heuristic is tight; where it takes long, by
+  /// greedy completion. Then BoundedSearch until the gap is closed.
   void RunCertified() {
-    using Search = RtdpBel<BeliefGraph, InflatedHeuristic>;
-    constexpr std::array<double, 3> kInflations = {1.2, 2.0, 5.0};
-    std::vector<Search> searches;
-    searches.reserve(kInflations.size());
-    for (const double epsilon : kInflations) searches.emplace_back(graph_, Inflated(epsilon), options_.seed);
-    const auto lower = [&] {
-      double best = 0.0;
-      for (std::size_t i = 0; i < searches.size(); ++i) {
-        best = std::max({best, searches[i].Lower(start_), searches[i].Value(start_) / kInflations[i]});
-      }
-      return best / weight_;
-    };
-    const auto expansions = [&] {
-      std::int64_t sum = 0;
-      for (const Search& search : searches) sum += search.expansions();
-      return sum;
-    };
-    Search* first = nullptr;
-    std::optional<SolverStatus> why;
-    for (std::int64_t budget = 5000; first == nullptr && !why; budget *= 4) {
-      for (std::size_t i = 0; i < searches.size() && first == nullptr && !why; ++i) {
-        const std::int64_t until = searches[i].updates() + budget;
-        bool over_budget = false;
-        why = searches[i].Run(start_, [&](std::int64_t) -> std::optional<SolverStatus> {
-          if (watch_.RowDue()) Row(result_.trials, expansions(), lower(), kInfinity);
-          over_budget = searches[i].updates() >= until;
-          if (over_budget) return SolverStatus::kExpansionLimit;
-          return watch_.Stop(expansions());
-        });
-        if (!why) {
-          first = &searches[i];
-        } else if (over_budget) {
-          why.reset();
-        }
-      }
-    }
+    constexpr double kInflation = 1.2;
+    constexpr std::int64_t kFirstUpdates = 20000;
+    RtdpBel search(graph_, Inflated(kInflation), options_.seed);
+    GreedyCompletion greedy(graph_);
+    const auto lower = [&] { return std::max(search.Lower(start_), search.Value(start_) / kInflation) / weight_; };
+    bool over_budget = false;
+    const auto why = search.Run(start_, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+      if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
+      over_budget = search.updates() >= kFirstUpdates;
+      if (over_budget) return SolverStatus::kExpansionLimit;
+      return watch_.Stop(expansions);
+    });
     result_.lower_bound = lower();
-    if (first == nullptr) {
+    result_.trials = search.trials();
+    if (!why) return CloseGap(search, 0);
+    // A complete policy comes first: greedy completion is not interrupted by limits.
+    const auto go_on = [](std::int64_t) { return std::optional<SolverStatus>(); };
+    greedy.Run(start_, go_on);
+    if (!over_budget) {
       result_.status = *why;
-      result_.expansions = expansions();
+      result_.expansions = search.expansions() + greedy.expansions();
+      result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return greedy.Action(b); });
       return;
     }
-    BoundedSearch search(graph_, *first, options_.gap);
-    const auto both = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
-    const std::int64_t before = expansions() - first->expansions();
-    const auto gap_closed = [&] { return search.Upper(start_) / weight_ <= options_.gap * both(); };
-    why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
-      if (watch_.RowDue()) Row(search.trials(), searched + before, both(), search.Upper(start_) / weight_);
-      if (gap_closed()) return SolverStatus::kGap;
-      return watch_.Stop(searched + before);
+    CloseGap(greedy, search.expansions());
+  }
+
+  template <class Incumbent>
+  void CloseGap(Incumbent& incumbent, std::int64_t expansions_before) {
+    BoundedSearch search(graph_, incumbent, options_.gap);
+    const auto lower = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
+    const auto why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
+      const double upper = search.Upper(start_) / weight_;
+      if (watch_.RowDue()) Row(result_.trials + search.trials(), searched + expansions_before, lower(), upper);
+      if (upper <= options_.gap * lower()) return SolverStatus::kGap;
+      return watch_.Stop(searched + expansions_before);
     });
-    result_.lower_bound = both();
-    result_.trials = first->trials() + search.trials();
-    result_.expansions = search.expansions() + before;
+    result_.lower_bound = lower();
+    result_.trials += search.trials();
+    result_.expansions = search.expansions() + expansions_before;
     result_.status = why.value_or(SolverStatus::kGap);
     result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return search.Action(b); });
-    if (result_.status == SolverStatus::kGap &&
-        result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
+    if (result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
       result_.status = SolverStatus::kConverged;
     }
   }

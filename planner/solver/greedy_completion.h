@@ -1,0 +1,151 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <queue>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "planner/solver/belief_model.h"
+#include "planner/solver/solve.h"
+
+namespace feeler::planner {
+
+/// A complete policy fast, without a promise: from each belief walk, by the cheapest moves that show nothing, to the
+/// move that splits the belief best, judged by its cost plus the heuristic values of its outcomes; then the same from
+/// each outcome. It always ends, because every such step leaves fewer hypotheses. Used as an incumbent where RTDP-Bel
+/// takes long. Same interface as RtdpBel, so that BoundedSearch can start from either.
+template <BeliefModel Model>
+class GreedyCompletion {
+ public:
+  using Belief = std::uint32_t;
+
+  explicit GreedyCompletion(Model& model) : model_(model) {}
+
+  /// Finds a policy from `start`; nothing is kept of beliefs in work when `stop(expansions)` interrupts.
+  template <class Stop>
+  std::optional<SolverStatus> Run(Belief start, Stop stop) {
+    std::vector<Belief> open = {start};
+    while (!open.empty()) {
+      const Belief b = open.back();
+      if (Solved(b)) {
+        open.pop_back();
+        continue;
+      }
+      if (!plans_.contains(b)) {
+        if (const auto why = MakePlan(b, stop)) return why;
+      }
+      const Plan& plan = plans_.at(b);
+      bool ready = true;
+      model_.ForEachSuccessor(model_.Actions(plan.path.back().first)[static_cast<std::size_t>(plan.path.back().second)],
+                              [&](Belief next) {
+                                if (Solved(next)) return;
+                                ready = false;
+                                open.push_back(next);
+                              });
+      if (!ready) continue;
+      for (auto step = plan.path.rbegin(); step != plan.path.rend(); ++step) Settle(step->first, step->second);
+      plans_.erase(b);
+      open.pop_back();
+    }
+    return std::nullopt;
+  }
+
+  bool Solved(Belief b) const { return b < nodes_.size() && nodes_[b].action >= 0; }
+  double Value(Belief b) const { return nodes_[b].value; }
+  int Action(Belief b) const { return nodes_[b].action; }
+  std::int64_t expansions() const { return expansions_; }
+  std::int64_t trials() const { return 0; }
+
+ private:
+  struct State {
+    double value = 0.0;
+    std::int32_t action = -1;
+  };
+  /// Moves that show nothing and at last one that splits (or leads to a belief that is solved): belief and action.
+  struct Plan {
+    std::vector<std::pair<Belief, int>> path;
+  };
+  struct Reached {
+    double cost = 0.0;
+    Belief from = 0;
+    int action = -1;
+  };
+
+  void Settle(Belief b, int action) {
+    if (b >= nodes_.size()) nodes_.resize(std::max<std::size_t>(model_.size(), b + std::size_t{1}));
+    if (nodes_[b].action >= 0) return;  // another plan came by since; its policy stands
+    const auto& chosen = model_.Actions(b)[static_cast<std::size_t>(action)];
+    double value = chosen.cost;
+    model_.ForEachSuccessor(chosen, [&](Belief next) { value += nodes_[next].value; });
+    nodes_[b] = {value, action};
+  }
+
+  double Estimate(Belief b) { return Solved(b) ? nodes_[b].value : model_.Heuristic(b); }
+
+  template <class Stop>
+  std::optional<SolverStatus> MakePlan(Belief start, Stop& stop) {
+    // A* over the beliefs with the same hypotheses; ends when no further walk can lead to a better split.
+    using Entry = std::tuple<double, Belief>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+    std::unordered_map<Belief, Reached> reached = {{start, {}}};
+    queue.emplace(model_.Heuristic(start), start);
+    double best = std::numeric_limits<double>::infinity();
+    std::pair<Belief, int> last = {start, -1};
+    while (!queue.empty()) {
+      const auto [estimate, b] = queue.top();
+      queue.pop();
+      if (estimate >= best) break;
+      const double cost = reached.at(b).cost;
+      if (estimate > cost + model_.Heuristic(b) + 1e-9 * (1.0 + estimate)) continue;  // outdated
+      if (const auto why = stop(expansions_)) return why;
+      if (!model_.expanded(b)) ++expansions_;
+      int index = -1;
+      for (const auto& action : model_.Actions(b)) {
+        ++index;
+        double value = cost + action.cost;
+        Belief only = 0;
+        int successors = 0;
+        model_.ForEachSuccessor(action, [&](Belief next) {
+          value += Estimate(next);
+          only = next;
+          ++successors;
+        });
+        const bool splits = successors != 1 || model_.Weight(only) != model_.Weight(b);
+        if (splits || Solved(only)) {
+          if (value < best) {
+            best = value;
+            last = {b, index};
+          }
+          continue;
+        }
+        const auto [at, added] = reached.try_emplace(only, Reached{cost + action.cost, b, index});
+        if (!added) {
+          if (cost + action.cost >= at->second.cost) continue;
+          at->second = {cost + action.cost, b, index};
+        }
+        queue.emplace(value, only);
+      }
+    }
+    Plan plan;
+    for (std::pair<Belief, int> step = last;; step = {reached.at(step.first).from, reached.at(step.first).action}) {
+      plan.path.push_back(step);
+      if (step.first == start) break;
+    }
+    std::ranges::reverse(plan.path);
+    plans_.emplace(start, std::move(plan));
+    return std::nullopt;
+  }
+
+  Model& model_;
+  std::vector<State> nodes_;
+  std::unordered_map<Belief, Plan> plans_;
+  std::int64_t expansions_ = 0;
+};
+
+}  // namespace feeler::planner
