@@ -25,6 +25,7 @@ class Drawing {
     sized->vis.global.offwidth = options.width;
     sized->vis.global.offheight = options.height;
     sized->vis.quality.offsamples = samples;
+    sized->vis.quality.shadowsize = options.shadow_resolution;
     mjv_defaultScene(&scene_);
     mjv_makeScene(sized.get(), &scene_, kMaxGeoms);
     mjr_defaultContext(&context_);
@@ -111,8 +112,9 @@ class Renderer::Context {
 Renderer::Renderer(std::shared_ptr<const mjModel> model, const RendererOptions& options)
     : model_(std::move(model)), options_(options) {
   if (options.width < 1 || options.height < 1 || options.width > 8192 || options.height > 8192 || options.samples < 0 ||
-      options.samples > 16) {
-    throw InputError("rendering", "size or samples out of range", "1 to 8192 pixels a side, 0 to 16 samples");
+      options.samples > 16 || options.shadow_resolution < 1 || options.shadow_resolution > 8192) {
+    throw InputError("rendering", "size, samples or shadow resolution out of range",
+                     "1 to 8192 pixels a side, 0 to 16 samples");
   }
   RouteMujocoMessages();
   context_ = std::make_unique<Context>(*model_, options_);
@@ -220,7 +222,9 @@ Image RenderSceneImage(const Scene& scene, const Pose& world_T_tool, SceneView v
     }
   }
   ResetScene(scene, best, *data);
-  Renderer renderer(scene.model, options);
+  RendererOptions still = options;
+  still.shadow_resolution = 8192;
+  Renderer renderer(scene.model, still);
   return renderer.Color(*data, view == SceneView::kOverview ? OverviewCamera(scene) : CloseUpCamera(scene));
 }
 

@@ -45,6 +45,7 @@ struct RendererOptions {
   int height = 720;
   int samples = 4;  ///< of multi-sample anti-aliasing, colour only: averaged depth is wrong at edges
   bool shadows = true;
+  int shadow_resolution = 2048;  ///< pixels a side of the shadow map; 8192 for stills
 };
 
 /// Pictures of a model without a screen (EGL, surfaceless; software rendering where there is no GPU).

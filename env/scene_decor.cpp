@@ -96,7 +96,7 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
 
   XMLElement& visual = *mujoco.InsertNewChildElement("visual");
   Add(visual, "global", {{"offwidth", "1920"}, {"offheight", "1200"}});
-  Add(visual, "headlight", {{"ambient", "0.30 0.30 0.30"}, {"diffuse", "0.28 0.28 0.28"}, {"specular", "0.1 0.1 0.1"}});
+  Add(visual, "headlight", {{"ambient", "0.34 0.34 0.34"}, {"diffuse", "0.32 0.32 0.32"}, {"specular", "0.1 0.1 0.1"}});
   Add(visual, "quality", {{"shadowsize", "2048"}, {"offsamples", "4"}});
   Add(visual, "map", {{"znear", "0.01"}, {"zfar", "40"}});
 

@@ -28,6 +28,11 @@ Pose StartPose(const Scene& scene, const Eigen::Vector3d& shift_m = Eigen::Vecto
   return scene.task.world_T_target * Eigen::Translation3d(scene.task.start_offset_m + shift_m);
 }
 
+const DataHandle& TestData(const Scene& scene) {
+  static const DataHandle data = MakeData(*scene.model);
+  return data;
+}
+
 int Contacts(const Scene& scene, const JointVector& q, mjData& data) {
   SetJointPositions(scene, q, data);
   mj_kinematics(scene.model.get(), &data);
@@ -109,6 +114,54 @@ TEST(Transfer, AnywhereOverTheTable) {
   RecordProperty("mean_ms", std::to_string(total_ms / 12));
   RecordProperty("slowest_ms", std::to_string(slowest_ms));
   EXPECT_GT(planned, 6);
+}
+
+// The panel of the target stood upright between start and goal: the straight motion is barred and RRT-Connect must find
+// the way around it.
+TEST(Transfer, GoesAroundAWall) {
+  const Scene& scene = PlugScene();
+  TransferChecker checker(scene);
+  const Pose wall = MakePose(Eigen::Vector3d(0.7, 0.0, 0.2),
+                             Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX())));
+  checker.SetTargetPoses({wall});
+  const Eigen::Quaterniond down = Eigen::Quaterniond::Identity();
+  // The free branch nearest to a posture.
+  const auto branch_near = [&](const Eigen::Vector3d& position, const JointVector& posture) {
+    JointVector best = JointVector::Constant(1e9);
+    for (const JointVector& q : ToolInverseKinematics(scene, MakePose(position, down))) {
+      if (checker.Free(q) && (q - posture).norm() < (best - posture).norm()) best = q;
+    }
+    return best;
+  };
+  const JointVector start = branch_near(Eigen::Vector3d(0.65, -0.25, 0.12), scene.home_q_rad);
+  const JointVector goal = branch_near(Eigen::Vector3d(0.65, 0.25, 0.12), start);
+  ASSERT_LT((goal - start).norm(), 3.0);
+  const auto plan_once = [&] {
+    planner::TransferOptions options;
+    options.reach_m = checker.reach_m();
+    options.check_spacing_m = checker.clearance_m();
+    const planner::JointBounds bounds{JointVector::Constant(-std::numbers::pi),
+                                      JointVector::Constant(std::numbers::pi)};
+    const planner::TransferPlanner planner(
+        bounds, [&](const Eigen::VectorXd& q) { return checker.Free(q); }, options);
+    return planner.Plan(start, {goal});
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  const TransferPlan plan = plan_once();
+  const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - begin;
+  RecordProperty("rrt_planning_ms", std::to_string(elapsed.count()));
+  RecordProperty("rrt_checks", plan.checks);
+  ASSERT_TRUE(plan.planned()) << plan.reason;
+  EXPECT_GT(plan.way_points.size(), 2U);
+  EXPECT_EQ(plan.way_points, plan_once().way_points);
+  for (std::size_t i = 1; i < plan.way_points.size(); ++i) {
+    for (int k = 0; k <= 1000; ++k) {
+      const JointVector q = plan.way_points[i - 1] + k / 1000.0 * (plan.way_points[i] - plan.way_points[i - 1]);
+      const DataHandle& data = TestData(scene);
+      SetTargetPose(scene, wall, *data);
+      ASSERT_EQ(Contacts(scene, q, *data), 0);
+    }
+  }
 }
 
 TEST(Transfer, RespectsEveryPlaceTheTargetMayBe) {
