@@ -128,11 +128,12 @@ std::string Summary(const ExpandedPolicy& policy, const std::vector<Drawn>& draw
 }
 
 // Drawing, in pixels.
-constexpr double kColumn = 168.0;
+constexpr double kColumn = 230.0;
 constexpr double kRow = 40.0;
 constexpr double kBoxWidth = 84.0;
 constexpr double kBoxHeight = 28.0;
 constexpr double kMargin = 16.0;
+constexpr double kBend = 36.0;  // an edge bends within this, then runs level under its label
 
 constexpr const char* kStyle = R"(
  body{font:14px/1.4 system-ui,sans-serif;margin:24px;color:#1c2330;background:#fff}
@@ -211,9 +212,9 @@ std::string FormatPolicyHtml(const ExpandedPolicy& policy, const std::string& ti
     const double x0 = left(parent) + kBoxWidth, x1 = left(drawn), y0 = middle(parent), y1 = middle(drawn);
     format_to(out,
               "<path class=\"edge{}\" stroke-width=\"{:.2f}\" d=\"M{:.1f} {:.1f}C{:.1f} {:.1f} {:.1f} {:.1f} {:.1f} "
-              "{:.1f}\"/>\n",
-              drawn.branch->outcome.contact ? " contact" : "", 1.0 + 5.0 * std::sqrt(probability), x0, y0, x0 + 30.0,
-              y0, x0 + 10.0, y1, x1, y1);
+              "{:.1f}L{:.1f} {:.1f}\"/>\n",
+              drawn.branch->outcome.contact ? " contact" : "", 1.0 + 5.0 * std::sqrt(probability), x0, y0,
+              x0 + kBend / 2.0, y0, x0 + kBend / 2.0, y1, x0 + kBend, y1, x1, y1);
   }
   for (const Drawn& drawn : list) {
     const ExpandedNode& node = policy.nodes[static_cast<std::size_t>(drawn.node)];
@@ -227,9 +228,8 @@ std::string FormatPolicyHtml(const ExpandedPolicy& policy, const std::string& ti
     format_to(out, "<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text></g>\n", left(drawn) + kBoxWidth / 2.0, middle(drawn),
               label);
     if (drawn.branch == nullptr) continue;
-    format_to(out, "<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\">{}{} \xC2\xB7 {:.0f}%</text>\n", left(drawn) - 5.0,
-              middle(drawn) - 8.0, drawn.branch->outcome.cells, drawn.branch->outcome.contact ? "\xE2\x8A\xA3" : "",
-              100.0 * drawn.branch->probability);
+    format_to(out, "<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\">{} \xC2\xB7 {:.0f}%</text>\n", left(drawn) - 6.0,
+              middle(drawn) - 9.0, OutcomeText(drawn.branch->outcome), 100.0 * drawn.branch->probability);
   }
   return text + "</svg></div>\n</body>\n</html>\n";
 }
