@@ -18,8 +18,6 @@
 
 #include "core/error.h"
 
-extern char** environ;
-
 namespace feeler::env {
 
 // ffmpeg as a child process: frames into its standard input, its complaints kept in an unnamed file.

@@ -119,6 +119,7 @@ TransferPlan TransferPlanner::Plan(const Eigen::VectorXd& start_rad,
   }
   if (found == 0 && options_.iterations_all_goals > 0) {
     std::vector<Eigen::VectorXd> goals;
+    goals.reserve(order.size());
     for (const int goal : order) goals.push_back(goal_at(goal));
     std::vector<Eigen::VectorXd> way_points =
         SearchWay(counting, counted, start_rad, goals, options_.iterations_all_goals, options_.seed);

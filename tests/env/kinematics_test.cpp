@@ -3,8 +3,6 @@
 //   no branch is listed twice, all joints lie in (-pi, pi];  IK(T) is empty iff T is out of reach;
 //   Jacobian = derivative of FK (central differences as the oracle).
 
-#include "env/kinematics/ur10e.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "env/kinematics/ur10e.h"
 
 namespace feeler::env {
 namespace {

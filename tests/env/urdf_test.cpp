@@ -1,7 +1,5 @@
-// One robot, three descriptions: Denavit-Hartenberg, URDF, MJCF. Law: their forward kinematics agree to 1e-9 m for every
-// joint configuration; masses, limits and torques of the URDF arrive in the compiled model unchanged.
-
-#include "env/urdf_to_mjcf.h"
+// One robot, three descriptions: Denavit-Hartenberg, URDF, MJCF. Law: their forward kinematics agree to 1e-9 m for
+// every joint configuration; masses, limits and torques of the URDF arrive in the compiled model unchanged.
 
 #include <gtest/gtest.h>
 #include <urdf_model/model.h>
@@ -15,6 +13,7 @@
 #include "core/random.h"
 #include "env/kinematics/ur10e.h"
 #include "env/mujoco_handles.h"
+#include "env/urdf_to_mjcf.h"
 
 namespace feeler::env {
 namespace {
