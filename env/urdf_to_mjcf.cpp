@@ -194,7 +194,7 @@ class Emitter {
 
   // Emits the material at its first use.
   std::string Material(const urdf::Material& material) {
-    const std::string name = model_.getName() + "_" + material.name;
+    std::string name = model_.getName() + "_" + material.name;
     if (!materials_.insert(name).second) return name;
     XMLElement& element = *asset_.InsertNewChildElement("material");
     const Eigen::Vector4d rgba(material.color.r, material.color.g, material.color.b, material.color.a);
