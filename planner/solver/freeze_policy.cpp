@@ -14,7 +14,7 @@ namespace {
 
 class Freezer {
  public:
-  Freezer(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of) : graph_(graph), action_of_(action_of) {}
+  Freezer(BeliefGraph& graph, const std::function<GuardedMove(BeliefId)>& move_of) : graph_(graph), move_of_(move_of) {}
 
   Policy Run() {
     const BeliefId start = graph_.Start();
@@ -38,18 +38,18 @@ class Freezer {
       const auto [b, children_done] = stack.back();
       stack.pop_back();
       if (index_.contains(b)) continue;
-      const BeliefAction action = graph_.Actions(b)[static_cast<std::size_t>(action_of_(b))];
+      PolicyNode node;
+      node.move = move_of_(b);
+      const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(b, node.move);
       if (!children_done) {
         stack.emplace_back(b, true);
-        graph_.ForEachSuccessor(action, [&](BeliefId next) {
-          if (!index_.contains(next)) stack.emplace_back(next, false);
-        });
+        for (const BeliefOutcome& outcome : outcomes) {
+          if (outcome.next != kNoBelief && !index_.contains(outcome.next)) stack.emplace_back(outcome.next, false);
+        }
         continue;
       }
-      PolicyNode node;
-      node.move = {action.direction, action.cells};
       const double weight = graph_.Weight(b);
-      for (const BeliefOutcome& outcome : graph_.Outcomes(b, node.move)) {
+      for (const BeliefOutcome& outcome : outcomes) {
         PolicyBranch branch;
         branch.outcome = outcome.outcome;
         branch.probability = outcome.weight / weight;
@@ -81,7 +81,7 @@ class Freezer {
   }
 
   BeliefGraph& graph_;
-  const std::function<int(BeliefId)>& action_of_;
+  const std::function<GuardedMove(BeliefId)>& move_of_;
   Policy policy_;
   std::unordered_map<BeliefId, std::uint32_t> index_;
   std::map<std::tuple<SetId, int, int, int>, std::uint32_t> leaves_;
@@ -89,8 +89,8 @@ class Freezer {
 
 }  // namespace
 
-Policy FreezePolicy(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of) {
-  return Freezer(graph, action_of).Run();
+Policy FreezePolicy(BeliefGraph& graph, const std::function<GuardedMove(BeliefId)>& move_of) {
+  return Freezer(graph, move_of).Run();
 }
 
 bool StaysInWorkspace(const Problem& problem, const Policy& policy) {

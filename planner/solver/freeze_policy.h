@@ -7,9 +7,9 @@
 
 namespace feeler::planner {
 
-/// The policy that takes action `action_of(b)` (an index into BeliefGraph::Actions) at every belief it reaches from the
-/// start; must be acyclic. Costs are summed exactly; the lower bound is left zero.
-Policy FreezePolicy(BeliefGraph& graph, const std::function<int(BeliefId)>& action_of);
+/// The policy that makes the move `move_of(b)` at every belief it reaches from the start; must be acyclic. Costs are
+/// summed exactly; the lower bound is left zero.
+Policy FreezePolicy(BeliefGraph& graph, const std::function<GuardedMove(BeliefId)>& move_of);
 
 /// True if every move stays in the problem's workspace (for graphs that took it to be unbounded).
 bool StaysInWorkspace(const Problem& problem, const Policy& policy);

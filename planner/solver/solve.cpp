@@ -8,6 +8,7 @@
 #include "planner/belief/belief_graph.h"
 #include "planner/solver/bounded_search.h"
 #include "planner/solver/experience.h"
+#include "planner/solver/fewest_moves.h"
 #include "planner/solver/freeze_policy.h"
 #include "planner/solver/greedy_completion.h"
 #include "planner/solver/indistinguishable.h"
@@ -41,7 +42,7 @@ class Attempt {
   SolverResult Run() {
     start_ = graph_.Start();
     if (start_ == kNoBelief) {
-      result_.policy = FreezePolicy(graph_, [](BeliefId) { return 0; });
+      result_.policy = FreezePolicy(graph_, [](BeliefId) { return GuardedMove(); });
     } else {
       weight_ = graph_.Weight(start_);
       switch (options_.solver) {
@@ -85,7 +86,7 @@ class Attempt {
     if (why) {
       result_.status = *why;
     } else {
-      result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return search.Action(b); });
+      result_.policy = Freeze(search);
     }
   }
 
@@ -113,7 +114,7 @@ class Attempt {
     if (!over_budget) {
       result_.status = *why;
       result_.expansions = search.expansions() + greedy.expansions();
-      result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return greedy.Action(b); });
+      result_.policy = Freeze(greedy);
       return;
     }
     CloseGap(greedy, search.expansions());
@@ -133,10 +134,20 @@ class Attempt {
     result_.trials += search.trials();
     result_.expansions = search.expansions() + expansions_before;
     result_.status = why.value_or(SolverStatus::kGap);
-    result_.policy = FreezePolicy(graph_, [&](BeliefId b) { return search.Action(b); });
+    result_.policy = Freeze(search);
     if (result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
       result_.status = SolverStatus::kConverged;
     }
+  }
+
+  /// The policy that a search found, with as few moves as its cost allows.
+  template <class Search>
+  Policy Freeze(Search& search) {
+    const MoveMap moves = FewestMoves(graph_, [&](BeliefId b) {
+      const BeliefAction& action = graph_.Actions(b)[static_cast<std::size_t>(search.Action(b))];
+      return GuardedMove{action.direction, action.cells};
+    });
+    return FreezePolicy(graph_, [&](BeliefId b) { return moves.at(b); });
   }
 
   void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) {
