@@ -37,19 +37,7 @@ void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const Jo
   if (!joint_friction_nm.allFinite() || joint_friction_nm.minCoeff() < 0) {
     throw InputError("reset", "joint friction is negative or not finite", "give Nm, zero or more");
   }
-  if (joint_friction_nm != friction_) {
-    // Sizes do not depend on friction, so the data serves every copy.
-    if (joint_friction_nm.isZero(0.0)) {
-      model_ = scene_->model;
-    } else {
-      ModelHandle copy(mj_copyModel(nullptr, scene_->model.get()));
-      for (int i = 0; i < kJointCount; ++i) {
-        copy->dof_frictionloss[scene_->dof[static_cast<std::size_t>(i)]] += joint_friction_nm[i];
-      }
-      model_ = std::move(copy);
-    }
-    friction_ = joint_friction_nm;
-  }
+  UseFriction(joint_friction_nm);
   failure_.clear();
   contacts_.clear();
   applied_torque_.setZero();
@@ -58,6 +46,21 @@ void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const Jo
   UpdatePositions();
   tool_at_contact_ = ToolPose();
   CheckSound();
+}
+
+void World::UseFriction(const JointVector& joint_friction_nm) {
+  if (joint_friction_nm == friction_) return;
+  // Sizes do not depend on friction, so the data serves every copy.
+  if (joint_friction_nm.isZero(0.0)) {
+    model_ = scene_->model;
+  } else {
+    ModelHandle copy(mj_copyModel(nullptr, scene_->model.get()));
+    for (int i = 0; i < kJointCount; ++i) {
+      copy->dof_frictionloss[scene_->dof[static_cast<std::size_t>(i)]] += joint_friction_nm[i];
+    }
+    model_ = std::move(copy);
+  }
+  friction_ = joint_friction_nm;
 }
 
 void World::UpdatePositions() {
@@ -156,6 +159,7 @@ WorldState World::Save() const {
   s.mocap_pos = Copy(data_->mocap_pos, 3 * model_->nmocap);
   s.mocap_quat = Copy(data_->mocap_quat, 4 * model_->nmocap);
   s.contacts = contacts_;
+  s.joint_friction_nm = friction_;
   return s;
 }
 
@@ -168,6 +172,7 @@ void World::Restore(const WorldState& s) {
   if (!AllBelow(s.qpos.data(), model_->nq, kAbsurdVelocity) || !AllBelow(s.qvel.data(), model_->nv, kAbsurdVelocity)) {
     throw InputError("restore", "the state holds absurd positions or velocities", "restore only what this scene saved");
   }
+  UseFriction(s.joint_friction_nm);
   mj_resetData(model_.get(), data_.get());
   failure_.clear();
   data_->time = s.time_s;

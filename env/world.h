@@ -26,6 +26,7 @@ struct WorldState {
   double time_s = 0.0;
   std::vector<double> qpos, qvel, warmstart, mocap_pos, mocap_quat;
   std::vector<ContactForce> contacts;
+  JointVector joint_friction_nm = JointVector::Zero();
 };
 
 /// The physics of one episode: an mjData over a shared, constant scene.
@@ -79,6 +80,7 @@ class World {
   void Restore(const WorldState& state);
 
  private:
+  void UseFriction(const JointVector& joint_friction_nm);
   void UpdatePositions();
   void GatherContacts();
   void CheckSound();

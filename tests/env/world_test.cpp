@@ -72,7 +72,7 @@ TEST_F(WorldTest, ResetErasesThePast) {
 
 TEST_F(WorldTest, SavedStateContinues) {
   World world(scene_);
-  world.Reset(start_, target_);
+  world.Reset(start_, target_, JointVector::Constant(0.5));
   Trace(world, 150);
   const WorldState state = world.Save();
   const std::vector<double> continued = Trace(world, 150);
