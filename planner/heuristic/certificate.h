@@ -15,6 +15,10 @@ class CertificateHeuristic final : public BeliefHeuristic {
  public:
   CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table);
   double Weighted(SetId set, const Cell& robot) override;
+  std::size_t bytes() const override {
+    return terms_.capacity() * sizeof(Terms) + offsets_.capacity() * sizeof(std::int64_t) +
+           weights_.capacity() * sizeof(double);
+  }
 
  private:
   /// One hypothesis: where its value lies relative to the robot's place in plane 0.

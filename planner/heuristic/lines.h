@@ -56,6 +56,7 @@ class LineHeuristic final : public BeliefHeuristic {
  public:
   LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table);
   double Weighted(SetId set, const Cell& robot) override;
+  std::size_t bytes() const override { return runs_of_.capacity() * sizeof(Runs) + runs_.capacity() * sizeof(Run); }
 
  private:
   struct Run {

@@ -53,6 +53,10 @@ class LocalCertificateHeuristic final : public BeliefHeuristic {
  public:
   LocalCertificateHeuristic(const Problem& problem, const HypothesisSets& sets, const LocalCertificateTable& table);
   double Weighted(SetId set, const Cell& robot) override;
+  std::size_t bytes() const override {
+    return terms_.capacity() * sizeof(Terms) + planes_.capacity() * sizeof(std::uint64_t) +
+           weights_.capacity() * sizeof(double);
+  }
 
  private:
   struct Terms {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -41,6 +42,8 @@ struct SolverOptions {
   double gap = 1.2;
   double time_limit_s = std::numeric_limits<double>::infinity();            ///< wall time; > 0
   std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();  ///< the deterministic budget; >= 1
+  /// Stop (as at an expansion limit) when the belief store has grown to this; about 1 kB an expansion.
+  std::size_t memory_limit_bytes = std::size_t{1} << 31;
   std::uint64_t seed = 1;
   HeuristicKind heuristic = HeuristicKind::kCertificate;
   /// Beliefs that are translates of each other count as one. Only used where that is exact: uniform weights, a generous

@@ -58,6 +58,11 @@ class Attempt {
  private:
   InflatedHeuristic Inflated(double epsilon) const { return {&graph_, epsilon}; }
 
+  std::optional<SolverStatus> Stop(std::int64_t expansions) {
+    if (graph_.bytes() + heuristic_->bytes() > options_.memory_limit_bytes) return SolverStatus::kExpansionLimit;
+    return watch_.Stop(expansions);
+  }
+
   /// RTDP-Bel with heur^E in place of epsilon * heur.
   void RunERtdpBel() {
     if (experience_.kind == ExperienceKind::kNone || experience_.policy == nullptr) {
@@ -78,7 +83,7 @@ class Attempt {
     };
     const auto why = search.Run(start_, [&](std::int64_t expansions) {
       if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
-      return watch_.Stop(expansions);
+      return Stop(expansions);
     });
     result_.lower_bound = lower();
     result_.trials = search.trials();
@@ -103,7 +108,7 @@ class Attempt {
       if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
       over_budget = search.updates() >= kFirstUpdates;
       if (over_budget) return SolverStatus::kExpansionLimit;
-      return watch_.Stop(expansions);
+      return Stop(expansions);
     });
     result_.lower_bound = lower();
     result_.trials = search.trials();
@@ -128,7 +133,7 @@ class Attempt {
       const double upper = search.Upper(start_) / weight_;
       if (watch_.RowDue()) Row(result_.trials + search.trials(), searched + expansions_before, lower(), upper);
       if (upper <= options_.gap * lower()) return SolverStatus::kGap;
-      return watch_.Stop(searched + expansions_before);
+      return Stop(searched + expansions_before);
     });
     result_.lower_bound = lower();
     result_.trials += search.trials();
