@@ -26,9 +26,6 @@ TEST(SolvePlug, PoliciesReplayAtTheirCost) {
     EXPECT_EQ(evaluation.fault, "");
     EXPECT_NEAR(evaluation.expected_cost, result.expected_cost, 1e-9);
     EXPECT_LE(result.expected_cost, 1.2 * result.lower_bound + 1e-9);
-    std::printf("%s cost %.3f lower %.3f expansions %ld cpu %.4f nodes %zu\n", ToString(extents).c_str(),
-                result.expected_cost, result.lower_bound, static_cast<long>(result.expansions), result.cpu_s,
-                result.policy->nodes.size());
   }
 }
 
