@@ -32,11 +32,6 @@ bool IsBroadWall(const planner::ContactMap& map, const Cell& from, Direction dir
   return true;
 }
 
-Cell Nearest(const Eigen::Vector3d& cells) {
-  return {static_cast<int>(std::lround(cells.x())), static_cast<int>(std::lround(cells.y())),
-          static_cast<int>(std::lround(cells.z()))};
-}
-
 /// The axis across the insertion that is most in need of a touch; -1 if none is.
 int LoosestAxis(const TargetFit& fit, Direction insertion, double limit_cells, const std::array<bool, 3>& hopeless) {
   int loosest = -1;
@@ -64,7 +59,7 @@ std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& ma
     }
     return false;
   };
-  const auto path = FindFreePath(map, Nearest(displacement - map.phase()), suits, orientation);
+  const auto path = FindFreePath(map, NearestFree(map, displacement, orientation), suits, orientation);
   if (!path) return std::nullopt;
   touch.path = *path;
   return touch;

@@ -45,6 +45,32 @@ std::vector<double> GridValues(double lower, double upper, double step) {
   return values;
 }
 
+/// True if the wall met from `displacement` is square to the motion around the place of contact: the neighbouring lines
+/// meet it at the same travel, or miss it. A slanted wall (a bevel, a round side) tells about two axes at once and pins
+/// neither.
+bool IsSquareWall(const planner::ContactMap& map, const Eigen::Vector3d& displacement, Direction direction,
+                  int orientation) {
+  constexpr double kSame = 0.2;
+  constexpr double kMiss = 6.0;
+  const double travel = ContinuousTravel(map, displacement, direction, orientation);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == AxisOf(direction)) continue;
+    int same = 0;
+    for (const int sign : {1, -1}) {
+      Eigen::Vector3d line = displacement;
+      line[axis] += sign;
+      const double off = ContinuousTravel(map, line, direction, orientation) - travel;
+      if (std::abs(off) <= kSame) {
+        ++same;
+      } else if (off < kMiss) {
+        return false;
+      }
+    }
+    if (same == 0) return false;
+  }
+  return true;
+}
+
 /// Moves each axis onto the contacts that agree with `fit.position`; marks the axes that have any.
 void SnapToContacts(const planner::ContactMap& map, const std::vector<Touch>& evidence, int orientation,
                     const FitOptions& options, TargetFit& fit) {
@@ -56,6 +82,7 @@ void SnapToContacts(const planner::ContactMap& map, const std::vector<Touch>& ev
     const double residual = touch.travelled - travel;
     // The grid and its plateau centre add their own error to that of the reading.
     if (std::abs(residual) > options.violation_cells + options.step_cells) continue;
+    if (!IsSquareWall(map, touch.start - fit.position, touch.direction, orientation)) continue;
     sum[AxisOf(touch.direction)] += SignOf(touch.direction) * residual;
     count[AxisOf(touch.direction)] += 1.0;
   }

@@ -35,7 +35,7 @@ struct FitOptions {
 struct TargetFit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();    ///< lattice coordinates
   Eigen::Vector3d half_width = Eigen::Vector3d::Zero();  ///< of what explains the evidence equally well, per axis
-  std::array<bool, 3> pinned{};  ///< a contact along the axis agrees with the fit: the width is that of a measurement
+  std::array<bool, 3> pinned{};  ///< a contact with a wall square to the axis agrees with the fit
   int violations = 0;            ///< touches that the fit does not explain
 };
 

@@ -119,4 +119,25 @@ std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, co
   return std::nullopt;
 }
 
+Cell NearestFree(const planner::ContactMap& map, const Eigen::Vector3d& displacement_cells, int orientation) {
+  const Eigen::Vector3d lattice = displacement_cells - map.phase();
+  const Cell nearest(static_cast<int>(std::lround(lattice.x())), static_cast<int>(std::lround(lattice.y())),
+                     static_cast<int>(std::lround(lattice.z())));
+  Cell best = nearest;
+  double least = std::numeric_limits<double>::infinity();
+  for (int x = -2; x <= 2; ++x) {
+    for (int y = -2; y <= 2; ++y) {
+      for (int z = -2; z <= 2; ++z) {
+        const Cell cell = nearest + Cell(x, y, z);
+        const double distance = (cell.cast<double>() - lattice).squaredNorm();
+        if (distance < least && !map.Blocked(cell, orientation)) {
+          least = distance;
+          best = cell;
+        }
+      }
+    }
+  }
+  return best;
+}
+
 }  // namespace feeler::execution

@@ -20,4 +20,8 @@ bool IsClear(const planner::ContactMap& map, const Cell& displacement, int orien
 std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, const Cell& start,
                                               const std::function<bool(const Cell&)>& goal, int orientation = 0);
 
+/// The free displacement nearest to a continuous one (cells), within two cells; the nearest lattice point if none is.
+/// A tool beside a wall may round into it.
+Cell NearestFree(const planner::ContactMap& map, const Eigen::Vector3d& displacement_cells, int orientation = 0);
+
 }  // namespace feeler::execution

@@ -31,7 +31,7 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
     if (IsClear(map, candidate, orientation)) gate = candidate;
   }
   if (!gate) throw ExecutionFailure("insertion: no free place in front of the opening");
-  const Cell here = Nearest(mover.position() - target - map.phase());
+  const Cell here = NearestFree(map, mover.position() - target, orientation);
   auto path = FindFreePath(
       map, here, [&](const Cell& cell) { return cell == *gate; }, orientation);
   if (!path) throw ExecutionFailure("insertion: no free way to the opening");

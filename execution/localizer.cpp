@@ -18,6 +18,9 @@ constexpr double kSamePlace = 0.1;
 /// Shorter fast motions cost more than they save.
 constexpr double kShortestFast = 0.75;
 
+/// A chamfer is read up to this much deeper than the face around it, cells.
+constexpr double kRim = 0.6;
+
 double ThreadCpuSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -140,7 +143,7 @@ void Localizer::Postpone(const GuardedMove& move) {
     }
     pending_ = move.direction;
   }
-  if (!TakeOver(move, imagined)) FailOffTree(imagined);
+  if (!TakeOver(move, imagined, mover_.options().matching.tolerance_cells)) FailOffTree(imagined);
 }
 
 void Localizer::Flush() {
@@ -164,17 +167,24 @@ void Localizer::Flush() {
 
 void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
   Prediction now = prediction;
+  const double tolerance = mover_.options().matching.tolerance_cells;
   while (true) {
     const Eigen::Vector3d begun = mover_.position();
     const Touch touch = ProbeAlong(move, now);
     evidence_.push_back(touch);
     pending_.reset();
-    if (TakeOver(move, touch)) {
+    if (TakeOver(move, touch, tolerance)) {
       if (touch.contact) RetreatFromContact(move.direction);
       return;
     }
+    const bool over_mouth = MayHaveFallenIn(task_, problem_, mover_.position());
     if (touch.contact) mover_.Retreat(touch.end() - std::min(0.5, touch.travelled) * UnitVector(move.direction));
     if (FoundInside()) return;
+    // Not inside, but on the rim of the opening, perhaps: its chamfer is met deeper than the closed face.
+    if (over_mouth && touch.contact && move.direction == task_.insertion && TakeOver(move, touch, tolerance + kRim)) {
+      mover_.Retreat(Station());
+      return;
+    }
     mover_.Retreat(begun);  // to where it began, for the other side of the edge
     ShiftOffEdge(touch);
     now = Predict(move);
@@ -207,10 +217,9 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   return MakeTouch(move.direction, from, mover_.Probe(move.direction, end, "probe", left));
 }
 
-bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch) {
-  const ExecutorOptions& options = mover_.options();
-  const std::vector<OutcomeMatch> matches =
-      MatchOutcomes(*problem_.map, tracked_, robot_, move, touch, options.matching);
+bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells) {
+  const MatchOptions matching{tolerance_cells};
+  const std::vector<OutcomeMatch> matches = MatchOutcomes(*problem_.map, tracked_, robot_, move, touch, matching);
   for (const OutcomeMatch& match : matches) {
     const double before = ThreadCpuSeconds();
     const bool known = policy_.Observe(match.outcome);
@@ -222,7 +231,7 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch) {
       const double travel = PredictTravel(*problem_.map, best, touch.start, touch.direction);
       anchor_[axis] = best.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
-    Settle(*problem_.map, robot_, move, touch, match.outcome, options.matching, tracked_);
+    Settle(*problem_.map, robot_, move, touch, match.outcome, matching, tracked_);
     robot_ += match.outcome.cells * UnitCell(move.direction);
     return true;
   }

@@ -55,8 +55,9 @@ class Localizer {
   void Flush();
   void Feel(const GuardedMove& move, const Prediction& prediction);
   Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
-  /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it.
-  bool TakeOver(const GuardedMove& move, const Touch& touch);
+  /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
+  /// the tolerance (cells).
+  bool TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells);
   /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
   bool FoundInside();
   /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.
