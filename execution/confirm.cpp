@@ -32,6 +32,14 @@ bool IsBroadWall(const planner::ContactMap& map, const Cell& from, Direction dir
   return true;
 }
 
+TargetFit BestFit(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Region& likely,
+                  const Region& possible, int orientation, const FitOptions& options) {
+  const TargetFit near = FitTarget(map, evidence, likely.lower, likely.upper, orientation, options);
+  if (near.violations == 0) return near;
+  const TargetFit far = FitTargetAnywhere(map, evidence, possible.lower, possible.upper, orientation, options);
+  return far.violations < near.violations ? far : near;
+}
+
 /// The axis across the insertion that is most in need of a touch; -1 if none is.
 int LoosestAxis(const TargetFit& fit, Direction insertion, double limit_cells, const std::array<bool, 3>& hopeless) {
   int loosest = -1;
@@ -90,12 +98,12 @@ bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, c
   return true;
 }
 
-TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Eigen::Vector3d& lower,
-                  const Eigen::Vector3d& upper, Mover& mover, std::vector<Touch>& evidence) {
+TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Region& likely,
+                  const Region& possible, Mover& mover, std::vector<Touch>& evidence) {
   const ExecutorOptions& options = mover.options();
   const double limit_cells = mover.Cells(options.confirm_limit_m);
   std::array<bool, 3> hopeless{};
-  TargetFit fit = FitTarget(map, evidence, lower, upper, orientation, options.fit);
+  TargetFit fit = BestFit(map, evidence, likely, possible, orientation, options.fit);
   for (int attempt = 0; attempt < options.confirm_attempts; ++attempt) {
     const int axis = LoosestAxis(fit, insertion, limit_cells, hopeless);
     if (axis < 0) break;
@@ -121,7 +129,7 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
       const double off = std::max(mover.Cells(options.retreat_m), 0.5);
       mover.Retreat(report.end - off * UnitVector(plan->direction));
     }
-    fit = FitTarget(map, evidence, lower, upper, orientation, options.fit);
+    fit = BestFit(map, evidence, likely, possible, orientation, options.fit);
   }
   return fit;
 }

@@ -31,9 +31,16 @@ std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& ma
 bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,
                 const std::string& kind, Mover& mover, std::vector<Touch>& evidence);
 
+/// A box in lattice coordinates.
+struct Region {
+  Eigen::Vector3d lower = Eigen::Vector3d::Zero();
+  Eigen::Vector3d upper = Eigen::Vector3d::Zero();
+};
+
 /// Touches along the axes across `insertion` that the fit leaves wider than the limit, until none is (or attempts run
-/// out); adds to the evidence. Returns the last fit, of a target in the box [lower, upper].
-TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Eigen::Vector3d& lower,
-                  const Eigen::Vector3d& upper, Mover& mover, std::vector<Touch>& evidence);
+/// out); adds to the evidence. Returns the last fit: of a target in `likely` (around the hypotheses left), or, if that
+/// leaves touches unexplained, the better one in `possible` (around the start belief).
+TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Region& likely,
+                  const Region& possible, Mover& mover, std::vector<Touch>& evidence);
 
 }  // namespace feeler::execution

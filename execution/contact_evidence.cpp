@@ -154,4 +154,18 @@ TargetFit FitTarget(const planner::ContactMap& map, const std::vector<Touch>& ev
   return fit;
 }
 
+TargetFit FitTargetAnywhere(const planner::ContactMap& map, const std::vector<Touch>& evidence,
+                            const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, int orientation,
+                            const FitOptions& options) {
+  // Coarse: a grid point explains what the truth within half a step of it on every axis would explain.
+  FitOptions coarse = options;
+  coarse.step_cells = 0.5;
+  coarse.violation_cells += 0.5 * coarse.step_cells;
+  coarse.slack_cells += 0.5 * coarse.step_cells;
+  const TargetFit area = FitTarget(map, evidence, lower, upper, orientation, coarse);
+  const Eigen::Vector3d reach = area.half_width + Eigen::Vector3d::Constant(1.0);
+  return FitTarget(map, evidence, (area.position - reach).cwiseMax(lower).cwiseMin(upper),
+                   (area.position + reach).cwiseMin(upper).cwiseMax(lower), orientation, options);
+}
+
 }  // namespace feeler::execution

@@ -45,4 +45,9 @@ struct TargetFit {
 TargetFit FitTarget(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& lower,
                     const Eigen::Vector3d& upper, int orientation = 0, const FitOptions& options = {});
 
+/// The same for a box of any size: a coarse search finds the part of it that is worth the fine one.
+TargetFit FitTargetAnywhere(const planner::ContactMap& map, const std::vector<Touch>& evidence,
+                            const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, int orientation = 0,
+                            const FitOptions& options = {});
+
 }  // namespace feeler::execution

@@ -4,20 +4,36 @@
 
 namespace feeler::execution {
 
+namespace {
+
+/// From the lattice point `at`, or, if that is in a wall, from the free one behind it.
+double TravelFrom(const planner::ContactMap& map, Cell at, Direction direction, int orientation) {
+  const Cell step = UnitCell(direction);
+  for (int back = 0; back <= kDeepestCells; ++back, at -= step) {
+    if (!map.Blocked(at, orientation)) return static_cast<double>(map.Travel(at, direction, orientation)) - back;
+  }
+  return -kDeepestCells;
+}
+
+}  // namespace
+
 double ContinuousTravel(const planner::ContactMap& map, const Eigen::Vector3d& displacement_cells, Direction direction,
                         int orientation) {
   const Eigen::Vector3d lattice = displacement_cells - map.phase();
-  Cell nearest(static_cast<int>(std::lround(lattice.x())), static_cast<int>(std::lround(lattice.y())),
-               static_cast<int>(std::lround(lattice.z())));
-  const int axis = AxisOf(direction);
-  const double ahead = SignOf(direction) * (lattice[axis] - nearest[axis]);
-  const Cell step = UnitCell(direction);
-  for (int back = 0; back <= kDeepestCells; ++back, nearest -= step) {
-    if (!map.Blocked(nearest, orientation)) {
-      return static_cast<double>(map.Travel(nearest, direction, orientation)) - back - ahead;
-    }
+  const Cell nearest(static_cast<int>(std::lround(lattice.x())), static_cast<int>(std::lround(lattice.y())),
+                     static_cast<int>(std::lround(lattice.z())));
+  const int along = AxisOf(direction);
+  const double at_nearest = TravelFrom(map, nearest, direction, orientation);
+  double travel = at_nearest - SignOf(direction) * (lattice[along] - nearest[along]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double aside = lattice[axis] - nearest[axis];
+    if (axis == along || aside == 0.0) continue;
+    Cell neighbour = nearest;
+    neighbour[axis] += aside > 0.0 ? 1 : -1;
+    const double slope = TravelFrom(map, neighbour, direction, orientation) - at_nearest;
+    if (std::abs(slope) <= kSteepest) travel += std::abs(aside) * slope;
   }
-  return -kDeepestCells;
+  return travel;
 }
 
 }  // namespace feeler::execution

@@ -17,13 +17,8 @@
 namespace feeler::execution {
 namespace {
 
-struct Hull {
-  Eigen::Vector3d lower = Eigen::Vector3d::Zero();
-  Eigen::Vector3d upper = Eigen::Vector3d::Zero();
-};
-
-Hull HullOf(const std::vector<planner::Hypothesis>& hypotheses) {
-  Hull hull{hypotheses.front().offset.cast<double>(), hypotheses.front().offset.cast<double>()};
+Region HullOf(const std::vector<planner::Hypothesis>& hypotheses) {
+  Region hull{hypotheses.front().offset.cast<double>(), hypotheses.front().offset.cast<double>()};
   for (const planner::Hypothesis& h : hypotheses) {
     hull.lower = hull.lower.cwiseMin(h.offset.cast<double>());
     hull.upper = hull.upper.cwiseMax(h.offset.cast<double>());
@@ -32,24 +27,31 @@ Hull HullOf(const std::vector<planner::Hypothesis>& hypotheses) {
 }
 
 LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
-  const Hull hull = HullOf(problem.hypotheses);
+  const Region hull = HullOf(problem.hypotheses);
   return {world_T_estimate, 0.5 * (hull.lower + hull.upper), task.cell_m};
 }
 
-/// Where the target may be if it is near one of the hypotheses left: a cell around them, within the start belief.
-Hull SearchBox(const std::vector<TrackedHypothesis>& left, const Hull& start) {
-  Hull box{left.front().position(), left.front().position()};
-  for (const TrackedHypothesis& t : left) {
-    box.lower = box.lower.cwiseMin(t.position());
-    box.upper = box.upper.cwiseMax(t.position());
-  }
-  // A truth uniform in the lattice span plus half a cell each side, and a little for errors of measurement.
+/// Where a truth that belongs to the start belief may be: uniform in the lattice span plus half a cell each side, and a
+/// little for errors of measurement.
+Region PossibleRegion(const planner::Problem& problem) {
   constexpr double kBeyondSpan = 0.6;
-  const Eigen::Vector3d lowest = start.lower - Eigen::Vector3d::Constant(kBeyondSpan);
-  const Eigen::Vector3d highest = start.upper + Eigen::Vector3d::Constant(kBeyondSpan);
-  box.lower = (box.lower - Eigen::Vector3d::Ones()).cwiseMax(lowest).cwiseMin(highest);
-  box.upper = (box.upper + Eigen::Vector3d::Ones()).cwiseMin(highest).cwiseMax(lowest);
-  return box;
+  Region region = HullOf(problem.hypotheses);
+  region.lower.array() -= kBeyondSpan;
+  region.upper.array() += kBeyondSpan;
+  return region;
+}
+
+/// A cell around the hypotheses left.
+Region LikelyRegion(const std::vector<TrackedHypothesis>& left, const Region& possible) {
+  Region region{left.front().position(), left.front().position()};
+  for (const TrackedHypothesis& t : left) {
+    region.lower = region.lower.cwiseMin(t.position());
+    region.upper = region.upper.cwiseMax(t.position());
+  }
+  const auto clamp = [&](const Eigen::Vector3d& u) {
+    return u.cwiseMax(possible.lower).cwiseMin(possible.upper).eval();
+  };
+  return {clamp(region.lower - Eigen::Vector3d::Ones()), clamp(region.upper + Eigen::Vector3d::Ones())};
 }
 
 Eigen::Vector3d Mean(const std::vector<TrackedHypothesis>& tracked) {
@@ -91,8 +93,9 @@ void Run(const Task& task, const planner::Problem& problem, const LatticeFrame& 
     record.fell_in = true;
     record.localized = true;
   } else if (insert.confirm) {
-    const Hull box = SearchBox(left, HullOf(problem.hypotheses));
-    const TargetFit fit = Confirm(*problem.map, task.insertion, orientation, box.lower, box.upper, mover, evidence);
+    const Region possible = PossibleRegion(problem);
+    const TargetFit fit =
+        Confirm(*problem.map, task.insertion, orientation, LikelyRegion(left, possible), possible, mover, evidence);
     target = fit.position;
     record.violations = fit.violations;
     for (int axis = 0; axis < 3; ++axis) {
