@@ -28,10 +28,16 @@ double ContinuousTravel(const planner::ContactMap& map, const Eigen::Vector3d& d
   for (int axis = 0; axis < 3; ++axis) {
     const double aside = lattice[axis] - nearest[axis];
     if (axis == along || aside == 0.0) continue;
-    Cell neighbour = nearest;
-    neighbour[axis] += aside > 0.0 ? 1 : -1;
-    const double slope = TravelFrom(map, neighbour, direction, orientation) - at_nearest;
-    if (std::abs(slope) <= kSteepest) travel += std::abs(aside) * slope;
+    const int side = aside > 0.0 ? 1 : -1;
+    const auto slope_to = [&](int to) {
+      Cell neighbour = nearest;
+      neighbour[axis] += to;
+      return to * (TravelFrom(map, neighbour, direction, orientation) - at_nearest);
+    };
+    double slope = slope_to(side);
+    // Up to an edge, the wall goes on as it comes from the other side.
+    if (std::abs(slope) > kSteepest) slope = slope_to(-side);
+    if (std::abs(slope) <= kSteepest) travel += aside * slope;
   }
   return travel;
 }

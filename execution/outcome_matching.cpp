@@ -58,29 +58,57 @@ void Settle(const planner::ContactMap& map, const Cell& robot, const GuardedMove
   }
 }
 
-std::optional<Eigen::Vector3d> GrazeShift(const planner::ContactMap& map, const std::vector<TrackedHypothesis>& tracked,
-                                          const Touch& touch, const MatchOptions& options) {
-  // From the shift found the lattice point lies this far on the side of the edge that was read.
+namespace {
+
+/// From the shift found the lattice point lies this far on the side of the edge that was read.
+constexpr double kShift = 0.25;
+
+std::optional<Eigen::Vector3d> ShiftAcrossEdge(const planner::ContactMap& map,
+                                               const std::vector<TrackedHypothesis>& tracked, const Touch& touch,
+                                               const MatchOptions& options) {
   constexpr double kSearch = 0.6;
-  constexpr double kShift = 0.25;
   std::optional<Eigen::Vector3d> best;
   double least = options.tolerance_cells;
   for (const TrackedHypothesis& t : tracked) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (axis == AxisOf(touch.direction)) continue;
-      for (const int sign : {1, -1}) {
-        const Eigen::Vector3d side = sign * UnitVector(MakeDirection(axis, 1));
-        TrackedHypothesis shifted = t;
-        shifted.anchor += kSearch * side;
-        const double mismatch = Mismatch(map, shifted, touch);
-        if (mismatch < least - 1e-9) {
-          least = mismatch;
-          best = kShift * side;
-        }
+    for (const Direction side : kDirections) {
+      if (AxisOf(side) == AxisOf(touch.direction)) continue;
+      TrackedHypothesis shifted = t;
+      shifted.anchor += kSearch * UnitVector(side);
+      const double mismatch = Mismatch(map, shifted, touch);
+      if (mismatch < least - 1e-9) {
+        least = mismatch;
+        best = kShift * UnitVector(side);
       }
     }
   }
   return best;
+}
+
+/// Away from the wall nearest beside the place of a contact.
+std::optional<Eigen::Vector3d> ShiftOffWallBeside(const planner::ContactMap& map,
+                                                  const std::vector<TrackedHypothesis>& tracked, const Touch& touch) {
+  constexpr double kBeside = 0.75;
+  std::optional<Eigen::Vector3d> best;
+  double nearest = kBeside;
+  for (const TrackedHypothesis& t : tracked) {
+    for (const Direction side : kDirections) {
+      if (AxisOf(side) == AxisOf(touch.direction)) continue;
+      const double travel = PredictTravel(map, t, touch.end(), side);
+      if (travel < nearest - 1e-9) {
+        nearest = travel;
+        best = -kShift * UnitVector(side);
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> GrazeShift(const planner::ContactMap& map, const std::vector<TrackedHypothesis>& tracked,
+                                          const Touch& touch, const MatchOptions& options) {
+  if (const auto shift = ShiftAcrossEdge(map, tracked, touch, options)) return shift;
+  return touch.contact ? ShiftOffWallBeside(map, tracked, touch) : std::nullopt;
 }
 
 }  // namespace feeler::execution

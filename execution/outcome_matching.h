@@ -52,7 +52,8 @@ void Settle(const planner::ContactMap& map, const Cell& robot, const GuardedMove
             const Outcome& outcome, const MatchOptions& options, std::vector<TrackedHypothesis>& tracked);
 
 /// A small shift of the target across the touch that explains a reading which is off the tree: an edge met (or missed)
-/// because the truth lies at the rim of its cell. In cells; empty if there is none.
+/// because the truth lies at the rim of its cell, or else a wall close beside that the tool scraped along. In cells;
+/// empty if there is none.
 std::optional<Eigen::Vector3d> GrazeShift(const planner::ContactMap& map, const std::vector<TrackedHypothesis>& tracked,
                                           const Touch& touch, const MatchOptions& options = {});
 

@@ -95,5 +95,16 @@ TEST(OutcomeMatching, EdgeMetByLittleIsExplainedByAShiftAwayFromIt) {
   EXPECT_EQ(shift->z(), 0.0);
 }
 
+TEST(OutcomeMatching, ScrapingAlongAWallIsExplainedByAShiftAwayFromIt) {
+  const auto map = HousingMap();
+  const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), map, {1, 1, 1});
+  const Cell robot(-10, -17, -3);  // half a cell beside the housing
+  const Touch touch{robot.cast<double>() + map->phase(), Direction::kPlusX, 7.0, true};
+  const auto shift = GrazeShift(*map, Track(problem), touch);
+  ASSERT_TRUE(shift.has_value());
+  EXPECT_LT(shift->y(), 0.0);
+  EXPECT_EQ(shift->x(), 0.0);
+}
+
 }  // namespace
 }  // namespace feeler::execution
