@@ -1,6 +1,5 @@
 #include "planner/heuristic/certificate.h"
 
-#include <array>
 #include <limits>
 #include <utility>
 
@@ -8,8 +7,9 @@
 
 namespace feeler::planner {
 
-CertificateHeuristic::CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table)
-    : sets_(sets), table_(std::move(table)) {
+CertificateHeuristic::CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table,
+                                           std::shared_ptr<const PairCertificates> pairs)
+    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs)) {
   uniform_ = sets_.uniform();
 }
 
@@ -20,11 +20,9 @@ const CertificateHeuristic::Terms& CertificateHeuristic::Prepare(SetId set) {
   terms.ready = true;
   terms.first = static_cast<std::uint32_t>(offsets_.size());
   terms.count = sets_.info(set).size;
-  std::array<Cell, 6> neighbours;
-  for (int i = 0; i < 6; ++i) neighbours[static_cast<std::size_t>(i)] = table_->neighbour(i);
-  NeighbourMasks(sets_, set, neighbours, masks_);
-  const auto strides = table_->strides();
-  const auto plane = static_cast<std::int64_t>(table_->plane_size());
+  NeighbourMasks(sets_, set, table_->neighbours(), masks_);
+  const auto strides = table_->grid().strides();
+  const auto plane = static_cast<std::int64_t>(table_->grid().cells);
   std::size_t k = 0;
   sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
     offsets_.push_back((std::int64_t{orientation} * CertificateTable::kMasks + masks_[k++]) * plane -
@@ -35,15 +33,19 @@ const CertificateHeuristic::Terms& CertificateHeuristic::Prepare(SetId set) {
 }
 
 double CertificateHeuristic::Weighted(SetId set, const Cell& robot) {
+  if (sets_.info(set).goal) return 0.0;
+  return Neighbours(set, robot) + isolated_.Weighted(set, robot);
+}
+
+double CertificateHeuristic::Neighbours(SetId set, const Cell& robot) {
   const HypothesisSets::Info& info = sets_.info(set);
-  if (info.goal) return 0.0;
-  const CellBox& domain = table_->domain();
+  const CellBox& domain = table_->grid().domain;
   if (!domain.Contains(robot - info.low) || !domain.Contains(robot - info.high)) return Slow(set, robot);
   const Terms& terms = Prepare(set);
   const std::uint16_t* const values = table_->values();
-  const auto base =
-      static_cast<std::int64_t>(table_->Index(robot - info.low)) +
-      (info.low.x() * table_->strides()[0] + info.low.y() * table_->strides()[1] + info.low.z() * table_->strides()[2]);
+  const auto base = static_cast<std::int64_t>(table_->grid().Index(robot - info.low)) +
+                    (info.low.x() * table_->grid().strides()[0] + info.low.y() * table_->grid().strides()[1] +
+                     info.low.z() * table_->grid().strides()[2]);
   const std::int64_t* const offsets = offsets_.data() + terms.first;
   if (uniform_) {
     std::uint64_t sum = 0;
@@ -54,7 +56,7 @@ double CertificateHeuristic::Weighted(SetId set, const Cell& robot) {
       sum += value;
     }
     if (worst == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
-    return static_cast<double>(sum) * table_->unit();
+    return static_cast<double>(sum) * table_->grid().unit;
   }
   double sum = 0.0;
   for (std::uint32_t i = 0; i < terms.count; ++i) {
@@ -62,13 +64,11 @@ double CertificateHeuristic::Weighted(SetId set, const Cell& robot) {
     if (value == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
     sum += weights_[terms.first + i] * value;
   }
-  return sum * table_->unit();
+  return sum * table_->grid().unit;
 }
 
 double CertificateHeuristic::Slow(SetId set, const Cell& robot) {
-  std::array<Cell, 6> neighbours;
-  for (int i = 0; i < 6; ++i) neighbours[static_cast<std::size_t>(i)] = table_->neighbour(i);
-  NeighbourMasks(sets_, set, neighbours, masks_);
+  NeighbourMasks(sets_, set, table_->neighbours(), masks_);
   double sum = 0.0;
   std::size_t k = 0;
   sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
@@ -76,7 +76,7 @@ double CertificateHeuristic::Slow(SetId set, const Cell& robot) {
     sum += value == CertificateTable::kUnreachable ? std::numeric_limits<double>::infinity()
                                                    : sets_.Weight(layer, bit) * value;
   });
-  return sum * table_->unit();
+  return sum * table_->grid().unit;
 }
 
 }  // namespace feeler::planner

@@ -6,18 +6,20 @@
 
 #include "planner/heuristic/belief_heuristic.h"
 #include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/pair_certificates.h"
 
 namespace feeler::planner {
 
 /// Sum over the hypotheses of a belief of the cost to tell each from those of its neighbours that are in the belief
-/// (see CertificateTable).
+/// (see CertificateTable); from the nearest one where none is (see IsolatedHypotheses).
 class CertificateHeuristic final : public BeliefHeuristic {
  public:
-  CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table);
+  CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table,
+                       std::shared_ptr<const PairCertificates> pairs);
   double Weighted(SetId set, const Cell& robot) override;
   std::size_t bytes() const override {
     return terms_.capacity() * sizeof(Terms) + offsets_.capacity() * sizeof(std::int64_t) +
-           weights_.capacity() * sizeof(double);
+           weights_.capacity() * sizeof(double) + isolated_.bytes();
   }
 
  private:
@@ -28,10 +30,12 @@ class CertificateHeuristic final : public BeliefHeuristic {
     bool ready = false;
   };
   const Terms& Prepare(SetId set);
+  double Neighbours(SetId set, const Cell& robot);
   double Slow(SetId set, const Cell& robot);
 
   const HypothesisSets& sets_;
   std::shared_ptr<const CertificateTable> table_;
+  IsolatedHypotheses isolated_;
   std::vector<Terms> terms_;
   std::vector<std::int64_t> offsets_;
   std::vector<double> weights_;  ///< beside `offsets_` for a prior that is not uniform

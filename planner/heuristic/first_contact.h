@@ -6,7 +6,7 @@
 
 #include "planner/contact/contact_map.h"
 #include "planner/heuristic/belief_heuristic.h"
-#include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/certificate_grid.h"
 
 namespace feeler::planner {
 

@@ -145,8 +145,9 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
   }
 }
 
-LineHeuristic::LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table)
-    : sets_(sets), table_(std::move(table)) {}
+LineHeuristic::LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table,
+                             std::shared_ptr<const PairCertificates> pairs)
+    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs)) {}
 
 const LineHeuristic::Runs& LineHeuristic::Prepare(SetId set) {
   if (set >= runs_of_.size()) runs_of_.resize(sets_.count());
@@ -191,7 +192,7 @@ double LineHeuristic::Weighted(SetId set, const Cell& robot) {
     }
     best = std::max(best, sum);
   }
-  return best * table_->unit();
+  return best * table_->unit() + isolated_.Weighted(set, robot);
 }
 
 }  // namespace feeler::planner

@@ -8,7 +8,8 @@
 #include "core/lattice.h"
 #include "planner/contact/contact_map.h"
 #include "planner/heuristic/belief_heuristic.h"
-#include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/certificate_grid.h"
+#include "planner/heuristic/pair_certificates.h"
 
 namespace feeler::planner {
 
@@ -51,12 +52,16 @@ class LineTable {
 
 /// The medium heuristic, of the paper setting: a belief is partitioned into maximal runs along an axis, and w(H) V(r,H)
 /// >= sum over the parts of w(Hi) V(r,Hi), because a policy that localizes H localizes every part of it. The best of
-/// the three axes. Needs a uniform prior (else zero).
+/// the three axes; hypotheses alone along all of them are bounded by IsolatedHypotheses. Needs a uniform prior (else
+/// zero).
 class LineHeuristic final : public BeliefHeuristic {
  public:
-  LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table);
+  LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table,
+                std::shared_ptr<const PairCertificates> pairs);
   double Weighted(SetId set, const Cell& robot) override;
-  std::size_t bytes() const override { return runs_of_.capacity() * sizeof(Runs) + runs_.capacity() * sizeof(Run); }
+  std::size_t bytes() const override {
+    return runs_of_.capacity() * sizeof(Runs) + runs_.capacity() * sizeof(Run) + isolated_.bytes();
+  }
 
  private:
   struct Run {
@@ -72,6 +77,7 @@ class LineHeuristic final : public BeliefHeuristic {
 
   const HypothesisSets& sets_;
   std::shared_ptr<const LineTable> table_;
+  IsolatedHypotheses isolated_;
   std::vector<Runs> runs_of_;
   std::vector<Run> runs_;
 };

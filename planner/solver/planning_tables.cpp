@@ -14,6 +14,7 @@ Cell SpreadOf(const Problem& problem) {
 PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options)
     : map_(problem.map), masks_(*problem.map) {
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
+  pairs_ = std::make_shared<PairCertificates>(problem.map, costs, SpreadOf(problem));
   switch (options.heuristic) {
     case HeuristicKind::kCertificate:
       if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
@@ -30,9 +31,9 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
                                                                const HypothesisSets& sets) const {
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
-  if (lines_) return std::make_unique<LineHeuristic>(sets, lines_);
+  if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
-  return std::make_unique<CertificateHeuristic>(sets, certificate_);
+  return std::make_unique<CertificateHeuristic>(sets, certificate_, pairs_);
 }
 
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options) {

@@ -7,6 +7,7 @@
 #include "planner/heuristic/certificate_table.h"
 #include "planner/heuristic/first_contact.h"
 #include "planner/heuristic/lines.h"
+#include "planner/heuristic/pair_certificates.h"
 #include "planner/heuristic/local_certificate.h"
 #include "planner/solver/solve.h"
 
@@ -24,6 +25,7 @@ class PlanningTables {
   std::shared_ptr<const ContactMap> map_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
+  std::shared_ptr<const PairCertificates> pairs_;
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;
   std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/lattice.h"
+#include "planner/belief/hypothesis_sets.h"
+#include "planner/contact/contact_map.h"
+#include "planner/heuristic/certificate_grid.h"
+#include "planner/heuristic/certificate_walks.h"
+
+namespace feeler::planner {
+
+/// For two hypotheses h and h + offset of one orientation: the least cost of a walk, as the tool fares under h, that
+/// tells them apart. A table per offset, built when first asked for; safe to use from many threads.
+class PairCertificates {
+ public:
+  struct Plane {
+    CertificateGrid grid;
+    std::vector<std::uint16_t> values;
+    /// In units of grid.unit; kNoCertificate if no probe tells the two apart.
+    std::uint16_t At(const Cell& displacement) const { return values[grid.Index(displacement)]; }
+  };
+
+  PairCertificates(std::shared_ptr<const ContactMap> map, const StepCosts& costs, const Cell& spread);
+
+  const Plane& Get(const Cell& offset, int orientation) const;
+  /// A goal leaves hypotheses at most this far apart, per axis.
+  const Cell& spread() const { return spread_; }
+
+ private:
+  std::shared_ptr<const ContactMap> map_;
+  StepCosts costs_;
+  Cell spread_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::array<int, 4>, std::unique_ptr<const Plane>> planes_;
+};
+
+/// Lower bounds for the *isolated* hypotheses of a belief, those that have no axis neighbour in it, on which heuristics
+/// that look along the axes are silent: each must be told apart from the nearest other hypothesis.
+///
+/// Admissible: under h the policy's walk must tell h from every other hypothesis left out of its goal. Consistent: in a
+/// subset that still holds both, the nearest is the same.
+class IsolatedHypotheses {
+ public:
+  IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs);
+
+  /// Sum over the isolated hypotheses of weight * bound; infinity if a pair cannot be told apart.
+  double Weighted(SetId set, const Cell& robot);
+  std::size_t bytes() const { return terms_of_.capacity() * sizeof(Terms) + terms_.capacity() * sizeof(Term); }
+
+ private:
+  struct Term {
+    const PairCertificates::Plane* plane = nullptr;
+    Cell offset = Cell::Zero();
+    double weight = 1.0;
+  };
+  struct Terms {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    bool ready = false;
+  };
+  const Terms& Prepare(SetId set);
+
+  const HypothesisSets& sets_;
+  std::shared_ptr<const PairCertificates> pairs_;
+  std::array<Cell, 6> neighbours_;
+  std::vector<Terms> terms_of_;
+  std::vector<Term> terms_;
+  std::vector<std::uint8_t> masks_;
+};
+
+}  // namespace feeler::planner
