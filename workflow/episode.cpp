@@ -3,8 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/random.h"
-#include "env/transfer_checker.h"
 #include "workflow/cpu_clock.h"
 
 namespace feeler::workflow {
@@ -16,10 +14,6 @@ PoseError ErrorOf(const Task& task, const Pose& world_T_true, const Pose& world_
   Eigen::Vector3d across = difference.translation();
   across[along] = 0.0;
   return {across.norm(), std::abs(difference.translation()[along]), Eigen::AngleAxisd(difference.linear()).angle()};
-}
-
-Eigen::Vector3d HalfExtents(const Task& task, const planner::Extents& extents) {
-  return 0.5 * task.cell_m * Eigen::Vector3d(extents.nx, extents.ny, extents.nz);
 }
 
 bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
@@ -34,32 +28,10 @@ std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) 
       env::BuildScene(setup.task(), setup.model.xml, env::ModelsFolder().string()));
 }
 
-struct EpisodeRunner::TransferSearch {
-  explicit TransferSearch(std::shared_ptr<const env::Scene> episode_scene)
-      : scene(std::move(episode_scene)), checker(*scene) {}
-
-  std::vector<env::JointVector> Plan(const env::JointVector& start, const Pose& world_T_tool) {
-    const double start_s = ThreadCpuSeconds();
-    const planner::TransferPlan plan = env::PlanTransfer(checker, *scene, start, world_T_tool, settings);
-    cpu_s += ThreadCpuSeconds() - start_s;
-    return {plan.way_points.begin(), plan.way_points.end()};
-  }
-
-  std::shared_ptr<const env::Scene> scene;
-  env::TransferChecker checker;
-  env::TransferSettings settings;
-  double cpu_s = 0.0;
-};
-
 EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
                              PolicyFactory policy_factory, EpisodeOptions options)
     : setup_(std::move(setup)), policy_factory_(std::move(policy_factory)), options_(std::move(options)) {
-  transfer_search_ = std::make_shared<TransferSearch>(scene);
-  env::EnvOptions env_options;
-  env_options.robot.transfer_planner = [search = transfer_search_](
-                                           const env::World& /*world*/, const env::JointVector& start,
-                                           const Pose& world_T_tool) { return search->Plan(start, world_T_tool); };
-  environment_ = std::make_unique<env::InsertionEnv>(std::move(scene), env_options);
+  environment_ = std::make_unique<env::InsertionEnv>(std::move(scene));
 }
 
 EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
@@ -80,6 +52,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   reset.episode = episode;
   reset.world_T_estimate = draw.world_T_estimate;
   reset.world_T_target = draw.world_T_true;
+  reset.extents = AxisExtents(task, draw.extents);
   reset.noise = env::NoisePreset(options_.noise);
   reset.start = env::StartPlace::kHome;
   reset.withhold_true_pose = options_.withhold_true_pose;
@@ -91,13 +64,10 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
   record.policy = policy->name();
 
-  transfer_search_->settings.seed = RandomStream(options_.seed, episode, "transfer").Next();
-  transfer_search_->checker.SetTargetPoses(
-      env::TargetCandidates(draw.world_T_estimate, HalfExtents(task, draw.extents)));
-  transfer_search_->cpu_s = 0.0;
+  const double transfer_start_s = ThreadCpuSeconds();
   const MotionResult transfer =
       environment_->robot().Transfer(execution::StartPose(task, problem, draw.world_T_estimate));
-  record.timing.transfer_cpu_s = transfer_search_->cpu_s;
+  record.timing.transfer_cpu_s = ThreadCpuSeconds() - transfer_start_s;
 
   if (transfer.reason == StopReason::kReached) {
     execution::ExecutorOptions options;

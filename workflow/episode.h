@@ -42,12 +42,9 @@ class EpisodeRunner {
   env::InsertionEnv& environment() { return *environment_; }
 
  private:
-  struct TransferSearch;  ///< plans free-space motions around every pose that the target may have
-
   std::shared_ptr<const PlanningSetup> setup_;
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
-  std::shared_ptr<TransferSearch> transfer_search_;
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 

@@ -1,12 +1,18 @@
 #include "workflow/episode_draw.h"
 
-#include <vector>
-
 #include "core/error.h"
 #include "core/random.h"
 #include "env/insertion_env.h"
 
 namespace feeler::workflow {
+
+std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid) {
+  std::vector<int> extents;
+  for (const UncertainAxis& axis : task.axes) {
+    extents.push_back(axis.angular() ? axis.max_cells : cuboid[static_cast<int>(axis.kind)]);
+  }
+  return extents;
+}
 
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
                         std::uint64_t episode) {
@@ -16,12 +22,8 @@ EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, 
   draw.extents = family.problems[problem.Index(family.problems.size())];
   draw.world_T_estimate = task.world_T_target;
 
-  std::vector<int> extents;
-  for (const UncertainAxis& axis : task.axes) {
-    extents.push_back(axis.angular() ? axis.max_cells : draw.extents[static_cast<int>(axis.kind)]);
-  }
   RandomStream truth(seed, episode, "true pose");
-  draw.world_T_true = env::DrawTruePose(task, draw.world_T_estimate, extents, truth);
+  draw.world_T_true = env::DrawTruePose(task, draw.world_T_estimate, AxisExtents(task, draw.extents), truth);
   return draw;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "core/pose.h"
 #include "core/task.h"
@@ -14,6 +15,9 @@ struct EpisodeDraw {
   Pose world_T_estimate = Pose::Identity();  ///< what the episode is told: the nominal pose of the task
   Pose world_T_true = Pose::Identity();
 };
+
+/// Hypotheses per axis of the task, in the order of its axes.
+std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid);
 
 /// Episode k of a seed, the same alone or among thousands: a problem uniform in the family, and a true offset uniform
 /// in the lattice span plus half a cell each side along every uncertain axis. Throws InputError for an empty family.

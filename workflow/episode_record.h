@@ -36,7 +36,7 @@ struct EpisodeRecord {
 
   struct Timing {
     double plan_cpu_s = 0.0;      ///< look-up and decisions of the policy
-    double transfer_cpu_s = 0.0;  ///< planning of free-space motions
+    double transfer_cpu_s = 0.0;  ///< the way to the start pose: planning and physics
     double cpu_s = 0.0;           ///< the whole episode, physics included
   } timing;
 };

@@ -39,7 +39,7 @@ EpisodeRecord RecordEpisodeVideo(EpisodeRunner& runner, std::uint64_t episode, c
   video_options.height = kHeight;
   video_options.frames_per_second = kFramesPerSecond;
   env::VideoWriter video(path, video_options);
-  const env::DataHandle frame(mj_makeData(scene.model.get()));
+  const env::DataHandle frame = env::MakeData(*scene.model);
   const env::Camera overview = env::OverviewCamera(scene);
   const env::Camera close_up = env::CloseUpCamera(scene);
 
