@@ -10,6 +10,10 @@
 #include "cli/commands.h"
 #include "cli/progress_bar.h"
 #include "cli/solver_flags.h"
+#include "core/error.h"
+#include "env/image.h"
+#include "env/renderer.h"
+#include "env/scene.h"
 #include "workflow/planning_setup.h"
 
 namespace feeler::cli {
@@ -19,6 +23,8 @@ struct Flags {
   std::string task;
   std::string opening = "closed";
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  std::string view = "overview";
+  std::string out;
   bool json = false;
 };
 
@@ -117,6 +123,18 @@ void Show(const Flags& flags) {
   }
 }
 
+void Render(const Flags& flags) {
+  env::SceneView view = env::SceneView::kOverview;
+  if (flags.view == "close-up") {
+    view = env::SceneView::kCloseUp;
+  } else if (flags.view != "overview") {
+    throw InputError("--view", "unknown view \"" + flags.view + "\"", "choose one of overview, close-up");
+  }
+  RequireWritable("--out", flags.out);
+  const env::Scene scene = env::BuildScene(env::LoadTask(flags.task));
+  env::WritePng(env::RenderSceneImage(scene, view), flags.out);
+}
+
 void List(bool json) {
   const std::vector<std::string> names = env::ListTasks();
   if (json) {
@@ -141,6 +159,11 @@ void AddTaskCommand(CLI::App& app, Session& /*session*/) {
   show->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
   show->add_flag("--json", flags->json, "print JSON");
   show->callback([flags] { Show(*flags); });
+  CLI::App* render = task->add_subcommand("render", "A picture of robot, tool and target at the start pose");
+  render->add_option("task", flags->task, "name, or path of a task file")->required();
+  render->add_option("--view", flags->view, "overview or close-up")->capture_default_str();
+  render->add_option("--out", flags->out, "PNG file to write")->required();
+  render->callback([flags] { Render(*flags); });
 }
 
 }  // namespace feeler::cli

@@ -24,8 +24,7 @@ bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
 }  // namespace
 
 std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
-  return std::make_shared<const env::Scene>(
-      env::BuildScene(setup.task(), setup.model.xml, env::ModelsFolder().string()));
+  return std::make_shared<const env::Scene>(env::BuildScene(setup.model));
 }
 
 EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
