@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -26,19 +27,34 @@ void WriteFile(const std::string& path, const std::string& content) {
   std::ofstream(path, std::ios::binary) << content;
 }
 
+namespace {
+
+pid_t Start(const std::vector<std::string>& arguments, const std::string& out, const std::string& err) {
+  const pid_t child = fork();
+  if (child != 0) return child;
+  if (freopen(out.c_str(), "w", stdout) == nullptr || freopen(err.c_str(), "w", stderr) == nullptr) _exit(126);
+  std::vector<char*> argv = {const_cast<char*>(FEELER_BINARY)};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  execv(FEELER_BINARY, argv.data());
+  _exit(127);
+}
+
+}  // namespace
+
+bool KillFeelerAfter(const std::vector<std::string>& arguments, double seconds) {
+  const pid_t child = Start(arguments, "/dev/null", "/dev/null");
+  usleep(static_cast<useconds_t>(seconds * 1e6));
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFSIGNALED(status);
+}
+
 CommandResult RunFeeler(const std::vector<std::string>& arguments) {
   static int calls = 0;
   const std::string folder = ScratchFolder("call" + std::to_string(calls++));
-  const pid_t child = fork();
-  if (child == 0) {
-    if (freopen((folder + "/out").c_str(), "w", stdout) == nullptr) _exit(126);
-    if (freopen((folder + "/err").c_str(), "w", stderr) == nullptr) _exit(126);
-    std::vector<char*> argv = {const_cast<char*>(FEELER_BINARY)};
-    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-    argv.push_back(nullptr);
-    execv(FEELER_BINARY, argv.data());
-    _exit(127);
-  }
+  const pid_t child = Start(arguments, folder + "/out", folder + "/err");
   int status = 0;
   waitpid(child, &status, 0);
   CommandResult result;

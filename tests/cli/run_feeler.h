@@ -14,6 +14,10 @@ struct CommandResult {
 /// Runs the feeler binary with these arguments, in a scratch folder of its own, with its cache under the test's folder.
 CommandResult RunFeeler(const std::vector<std::string>& arguments);
 
+/// Starts the feeler binary and ends it without warning (SIGKILL) after a while, or lets it end by itself before.
+/// Returns true if it was killed.
+bool KillFeelerAfter(const std::vector<std::string>& arguments, double seconds);
+
 /// A new empty folder under the test's temporary folder.
 std::string ScratchFolder(const std::string& name);
 
