@@ -1,0 +1,85 @@
+// feeler experiment: one of the paper's tables or figures, measured, beside the printed values.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "evaluation/experiments/registry.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string name;
+  std::string out;
+  bool list = false;
+  bool quick = false;
+  std::uint64_t seed = 1;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+void List() {
+  for (const evaluation::Experiment& experiment : evaluation::Experiments()) {
+    fmt::print("{:<16} {}\n", experiment.name, experiment.summary);
+  }
+}
+
+void Run(const Flags& flags, Session& session) {
+  if (flags.list) return List();
+  if (flags.name.empty()) {
+    throw InputError("experiment", "no name given", "choose one of " + evaluation::ExperimentNames());
+  }
+  const evaluation::Experiment& experiment = evaluation::FindExperiment(flags.name);
+  if (flags.out.empty()) throw InputError("--out", "missing", "give a folder for the results");
+  if (std::filesystem::exists(flags.out) && !std::filesystem::is_directory(flags.out)) {
+    throw InputError("--out", flags.out + " is a file", "give a folder");
+  }
+
+  ProgressBar map_bar("contact map");
+  ProgressBar bar(flags.name);
+  evaluation::ExperimentRequest request;
+  request.out = flags.out;
+  request.quick = flags.quick;
+  request.jobs = ParseJobs(flags.jobs);
+  request.seed = flags.seed;
+  request.command = fmt::format("feeler experiment {} --out {}{} --seed {} --jobs {}", flags.name, flags.out,
+                                flags.quick ? " --quick" : "", flags.seed, request.jobs.threads());
+  request.cancellation = session.cancellation;
+  request.map_progress = map_bar.Callback();
+  request.progress = bar.Callback();
+  const evaluation::ExperimentOutcome outcome = evaluation::RunExperiment(experiment, request);
+  map_bar.Finish();
+  bar.Finish();
+  if (!outcome.complete) {
+    fmt::print(stderr, "interrupted: what is done is kept in {}; run the same command again to go on\n",
+               outcome.partial_file);
+    session.exit_code = 1;
+    return;
+  }
+  fmt::print("{}", outcome.text);
+}
+
+}  // namespace
+
+void AddExperimentCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command =
+      app.add_subcommand("experiment", "Measure a table or figure of the paper beside its printed values");
+  command->add_option("name", flags->name, "which; see --list");
+  command->add_flag("--list", flags->list, "list the experiments");
+  command->add_option("--out", flags->out,
+                      "folder for NAME.csv, NAME.json and manifest.json; an interrupted run in it "
+                      "is continued");
+  command->add_flag("--quick", flags->quick, "few problems and short limits: a minute or two on two cores");
+  command->add_option("--seed", flags->seed, "of the sample and the first of the solver seeds")->capture_default_str();
+  command->add_option("--jobs", flags->jobs, "threads; more than the cores would spoil the measured times")
+      ->capture_default_str();
+  command->callback([flags, &session] { Run(*flags, session); });
+}
+
+}  // namespace feeler::cli

@@ -1,0 +1,143 @@
+// feeler policy: look at one policy.
+#include <fmt/format.h>
+
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "evaluation/experiment_output.h"
+#include "planner/belief/lattice_problem.h"
+#include "planner/solver/expand_policy.h"
+#include "policies/formats/lattice_problem_file.h"
+#include "policies/formats/policy_graph.h"
+#include "policies/formats/policy_json.h"
+#include "policies/storage/database.h"
+#include "workflow/database_builder.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string policy;
+  std::string problem;
+  std::string task;
+  std::string extents;
+  std::string db;
+  std::string opening = "closed";
+  std::string goal;
+  std::string format = "html";
+  std::string out;
+  int max_depth = std::numeric_limits<int>::max();
+  double min_probability = 0.0;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+planner::Problem TaskProblem(const Flags& flags, const std::string& task, workflow::PlanningSetupOptions options,
+                             const policies::Database* database) {
+  const planner::Extents extents = planner::ParseExtents(flags.extents);
+  ProgressBar bar("contact map");
+  options.jobs = ParseJobs(flags.jobs);
+  options.progress = bar.Callback();
+  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(task, options);
+  if (database != nullptr) database->RequireFingerprint(setup.task().name, setup.fingerprint);
+  workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
+  return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
+}
+
+/// A policy of the database at --extents.
+planner::ExpandedPolicy FromDatabase(const Flags& flags) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.db);
+  const auto stored = database.Get(planner::ParseExtents(flags.extents));
+  if (!stored) throw InputError(flags.db, "holds no problem " + flags.extents, "see feeler db list " + flags.db);
+  if (!stored->policy) throw NegativeResult(flags.db, flags.extents + " holds no complete policy");
+  const policies::DatabaseIdentity& identity = database.identity();
+  workflow::PlanningSetupOptions options;
+  options.opening = ParseOpening(identity.opening);
+  options.goal = ParseGoal(identity.goal);
+  const std::string task = flags.task.empty() ? identity.task : flags.task;
+  return planner::ExpandPolicy(TaskProblem(flags, task, options, &database), *stored->policy);
+}
+
+/// A policy file, with the problem that it was made for.
+planner::ExpandedPolicy FromFile(const Flags& flags) {
+  const policies::PolicyFile file = policies::ReadPolicyFile(flags.policy);
+  planner::Problem problem;
+  if (!flags.problem.empty()) {
+    planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
+    if (!flags.goal.empty()) data.goal = ParseGoal(flags.goal);
+    problem = planner::MakeLatticeProblem(data);
+  } else {
+    workflow::PlanningSetupOptions options;
+    options.opening = ParseOpening(flags.opening);
+    if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
+    problem = TaskProblem(flags, flags.task, options, nullptr);
+  }
+  return planner::ExpandPolicy(problem, policies::ToPolicy(file, problem, flags.policy));
+}
+
+void RequireOneSource(const Flags& flags) {
+  const std::string help = "see feeler policy graph --help";
+  if (flags.policy.empty() == flags.db.empty()) throw InputError("policy graph", "give either --policy or --db", help);
+  if (!flags.db.empty() && !flags.problem.empty()) throw InputError("--problem", "goes with --policy, not --db", help);
+  if (!flags.policy.empty() && flags.problem.empty() == flags.task.empty()) {
+    throw InputError("policy graph", "--policy needs its problem: give either --problem, or --task with --extents",
+                     help);
+  }
+  if (flags.problem.empty() && flags.extents.empty()) {
+    throw InputError("--extents", "missing", "give the extents, e.g. --extents 7x7x5");
+  }
+  if (!flags.problem.empty() && !flags.extents.empty()) {
+    throw InputError("--extents", "goes with --task or --db, not with --problem", "leave it out");
+  }
+}
+
+void Graph(const Flags& flags) {
+  if (flags.format != "dot" && flags.format != "html") {
+    throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of dot, html");
+  }
+  RequireOneSource(flags);
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  policies::PolicyGraphOptions options;
+  options.max_depth = flags.max_depth;
+  options.min_probability = flags.min_probability;
+  const planner::ExpandedPolicy policy = flags.db.empty() ? FromFile(flags) : FromDatabase(flags);
+  const std::string title = flags.db.empty() ? flags.policy : flags.db + " " + flags.extents;
+  const std::string text = flags.format == "dot" ? policies::FormatPolicyDot(policy, title, options)
+                                                 : policies::FormatPolicyHtml(policy, title, options);
+  if (flags.out.empty()) {
+    std::cout << text;
+  } else {
+    evaluation::WriteFileAtomically(flags.out, text);
+  }
+}
+
+}  // namespace
+
+void AddPolicyCommand(CLI::App& app, Session& /*session*/) {
+  CLI::App* policy = app.add_subcommand("policy", "Look at one policy");
+  policy->require_subcommand(1);
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = policy->add_subcommand("graph", "Draw a policy of a file or a database");
+  command->add_option("--policy", flags->policy, "policy file (docs/file-formats.md)");
+  command->add_option("--problem", flags->problem, "lattice problem file that the policy file was made for");
+  command->add_option("--task", flags->task, "task that the policy file was made for; with --db: the task's file");
+  command->add_option("--extents", flags->extents, "hypotheses per axis, e.g. 7x7x5 (with --task or --db)");
+  command->add_option("--db", flags->db, "database to take the policy from");
+  command->add_option("--opening", flags->opening, "closed or open while localizing (with --task)")
+      ->capture_default_str();
+  command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
+  command->add_option("--format", flags->format, "html (one page) or dot (Graphviz)")->capture_default_str();
+  command->add_option("--max-depth", flags->max_depth, "draw this many moves from the root (default: all)");
+  command->add_option("--min-probability", flags->min_probability, "leave out nodes reached more rarely, 0..1")
+      ->capture_default_str();
+  command->add_option("--out", flags->out, "file to write (default: standard output)");
+  command->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
+  command->callback([flags] { Graph(*flags); });
+}
+
+}  // namespace feeler::cli

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluation/experiments/experiment.h"
+#include "evaluation/experiments/paper_results.h"
+#include "evaluation/experiments/solver_sweep.h"
+
+namespace feeler::evaluation {
+
+/// The protocol of the tables that compare solvers on a sample of a problem family. The defaults were fixed before any
+/// run.
+struct SampleProtocol {
+  std::string family;    ///< empty: the whole family of the task
+  int strata = 5;        ///< quintiles of the number of hypotheses
+  int per_stratum = 8;   ///< problems drawn from each
+  int solver_seeds = 3;  ///< repetitions
+  double time_limit_s = 30.0;
+  std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();
+};
+/// Two problems a quintile, one seed, 2 s.
+SampleProtocol QuickProtocol();
+inline SampleProtocol ProtocolFor(bool quick) { return quick ? QuickProtocol() : SampleProtocol(); }
+
+/// A row of such a table.
+struct TableRow {
+  SolverRow solver;
+  std::optional<PrintedRow> printed;
+};
+
+/// Success, effort and cost of solvers on the same problems, relative to row `base`.
+struct DatabaseTable {
+  std::string name;   ///< of the experiment
+  std::string title;  ///< for people
+  std::vector<TableRow> rows;
+  std::size_t base = 0;       ///< speed and cost are relative to this row
+  std::size_t reference = 0;  ///< solves every problem; cost is relative to it where the base has none
+};
+
+/// Rows of the reference solvers in the fast setting: certified to 1.2 and RTDP-Bel at epsilon 1.2.
+TableRow FastCertifiedRow();
+TableRow FastRtdpBelRow();
+
+/// Measures a table; the limits of the protocol replace those of the rows.
+ExperimentResult RunDatabaseTable(const PlanningCase& planning_case, DatabaseTable table,
+                                  const SampleProtocol& protocol, const ExperimentRequest& request);
+
+/// A task with its socket closed or open while localizing. Throws InputError.
+PlanningCase LoadPlanningCase(const std::string& task, bool open, const ExperimentRequest& request);
+
+}  // namespace feeler::evaluation

@@ -1,0 +1,53 @@
+#include "evaluation/experiments/registry.h"
+
+#include <filesystem>
+
+#include "core/error.h"
+#include "evaluation/experiments/bounds.h"
+#include "evaluation/experiments/table1_plug.h"
+#include "evaluation/experiments/table3_ablation.h"
+
+namespace feeler::evaluation {
+
+std::string PartialFile(const ExperimentRequest& request, const std::string& name) {
+  return request.out + "/" + name + ".partial.jsonl";
+}
+
+const std::vector<Experiment>& Experiments() {
+  static const std::vector<Experiment> kExperiments = {
+      {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds},
+      {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug},
+      {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",
+       RunTable3Ablation},
+  };
+  return kExperiments;
+}
+
+std::string ExperimentNames() {
+  std::string names;
+  for (const Experiment& experiment : Experiments()) names += (names.empty() ? "" : ", ") + experiment.name;
+  return names;
+}
+
+const Experiment& FindExperiment(const std::string& name) {
+  for (const Experiment& experiment : Experiments()) {
+    if (experiment.name == name) return experiment;
+  }
+  throw InputError("experiment", "unknown name \"" + name + "\"", "choose one of " + ExperimentNames());
+}
+
+ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRequest& request) {
+  std::error_code error;
+  std::filesystem::create_directories(request.out, error);
+  if (error) throw InputError(request.out, "cannot be created: " + error.message(), "choose another folder");
+  ExperimentResult result = experiment.run(request);
+  ExperimentOutcome outcome{result.complete, PartialFile(request, experiment.name), result.text};
+  if (!result.complete) return outcome;
+  Manifest manifest{request.command, result.settings, result.seeds};
+  manifest.settings["jobs"] = request.jobs.threads();
+  result.details["manifest"] = ManifestJson(manifest);
+  WriteExperiment(request.out, experiment.name, result.table, result.details, manifest);
+  return outcome;
+}
+
+}  // namespace feeler::evaluation

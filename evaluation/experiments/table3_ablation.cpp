@@ -1,0 +1,28 @@
+#include "evaluation/experiments/table3_ablation.h"
+
+namespace feeler::evaluation {
+
+DatabaseTable Table3Ablation() {
+  DatabaseTable table;
+  table.name = kTable3AblationName;
+  table.title = "Table III, what the choice of experience and the order of problems do for E-RTDP-Bel at epsilon 2";
+  const auto add = [&](const std::string& variant, planner::ExperienceKind experience, planner::ProblemOrder order) {
+    table.rows.push_back(
+        {{variant, "paper", planner::PaperSetting(planner::SolverKind::kERtdpBel, 2.0), order, experience},
+         PrintedVariant("table3_ablation_plug", variant)});
+  };
+  add("ours", planner::ExperienceKind::kRollout, planner::ProblemOrder::kUncertainty);
+  add("naive", planner::ExperienceKind::kNaive, planner::ProblemOrder::kUncertainty);
+  add("random", planner::ExperienceKind::kRollout, planner::ProblemOrder::kRandom);
+  table.rows.push_back(FastCertifiedRow());
+  table.base = 0;
+  table.reference = table.rows.size() - 1;
+  return table;
+}
+
+ExperimentResult RunTable3Ablation(const ExperimentRequest& request) {
+  return RunDatabaseTable(LoadPlanningCase("plug", false, request), Table3Ablation(), ProtocolFor(request.quick),
+                          request);
+}
+
+}  // namespace feeler::evaluation
