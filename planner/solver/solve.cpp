@@ -95,34 +95,13 @@ class Attempt {
     }
   }
 
-  /// A first policy by inflated RTDP-Bel, which is good and fast where the heuristic is tight; where it takes long, by
-  /// greedy completion. Then BoundedSearch until the gap is closed.
+  /// A first policy by greedy completion, then BoundedSearch until the gap is closed. A complete policy comes first:
+  /// greedy completion is not interrupted by limits.
   void RunCertified() {
-    constexpr double kInflation = 1.2;
-    constexpr std::int64_t kFirstUpdates = 20000;
-    RtdpBel search(graph_, Inflated(kInflation), options_.seed);
     GreedyCompletion greedy(graph_);
-    const auto lower = [&] { return std::max(search.Lower(start_), search.Value(start_) / kInflation) / weight_; };
-    bool over_budget = false;
-    const auto why = search.Run(start_, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
-      if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
-      over_budget = search.updates() >= kFirstUpdates;
-      if (over_budget) return SolverStatus::kExpansionLimit;
-      return Stop(expansions);
-    });
-    result_.lower_bound = lower();
-    result_.trials = search.trials();
-    if (!why) return CloseGap(search, 0);
-    // A complete policy comes first: greedy completion is not interrupted by limits.
-    const auto go_on = [](std::int64_t) { return std::optional<SolverStatus>(); };
-    greedy.Run(start_, go_on);
-    if (!over_budget) {
-      result_.status = *why;
-      result_.expansions = search.expansions() + greedy.expansions();
-      result_.policy = Freeze(greedy);
-      return;
-    }
-    CloseGap(greedy, search.expansions());
+    greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); });
+    result_.lower_bound = graph_.Heuristic(start_) / weight_;
+    CloseGap(greedy, 0);
   }
 
   template <class Incumbent>
