@@ -12,6 +12,9 @@ namespace {
 /// A probe begins this far from the wall it expects, in cells: room for the uncertainty of the axis.
 constexpr double kNearest = 1.5;
 constexpr double kFarthest = 3.5;
+/// The wall is looked for at least this far behind where it is expected, in cells: the fit may be surer than it is
+/// right.
+constexpr double kLeastSlack = 1.5;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameWall = 0.2;
 
@@ -40,12 +43,14 @@ TargetFit BestFit(const planner::ContactMap& map, const std::vector<Touch>& evid
   return far.violations < near.violations ? far : near;
 }
 
-/// The axis across the insertion that is most in need of a touch; -1 if none is.
-int LoosestAxis(const TargetFit& fit, Direction insertion, double limit_cells, const std::array<bool, 3>& hopeless) {
+/// The axis across the insertion that is most in need of a touch; -1 if none is. An axis that no face has pinned is
+/// felt even where edges and slanted walls leave it narrow: what they tell hangs on the other axes, and one edge met on
+/// the wrong side of a tie would put the whole estimate off by cells.
+int LoosestAxis(const TargetFit& fit, Direction insertion, const std::array<bool, 3>& hopeless) {
   int loosest = -1;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    if (axis == AxisOf(insertion) || fit.pinned[i] || hopeless[i] || fit.half_width[axis] <= limit_cells) continue;
+    if (axis == AxisOf(insertion) || fit.pinned[i] || hopeless[i]) continue;
     if (loosest < 0 || fit.half_width[axis] > fit.half_width[loosest]) loosest = axis;
   }
   return loosest;
@@ -101,11 +106,10 @@ bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, c
 TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Region& likely,
                   const Region& possible, Mover& mover, std::vector<Touch>& evidence) {
   const ExecutorOptions& options = mover.options();
-  const double limit_cells = mover.Cells(options.confirm_limit_m);
   std::array<bool, 3> hopeless{};
   TargetFit fit = BestFit(map, evidence, likely, possible, orientation, options.fit);
   for (int attempt = 0; attempt < options.confirm_attempts; ++attempt) {
-    const int axis = LoosestAxis(fit, insertion, limit_cells, hopeless);
+    const int axis = LoosestAxis(fit, insertion, hopeless);
     if (axis < 0) break;
     const auto plan = PlanConfirmingTouch(map, mover.position() - fit.position, axis, orientation);
     if (!plan) {
@@ -114,7 +118,8 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
     }
     if (FollowPath(map, fit.position, plan->path, "transfer", mover, evidence)) {
       const double from = mover.position()[axis];
-      const double farthest = plan->travel_cells + fit.half_width[axis] + options.sure_overtravel_cells;
+      const double slack = std::max(fit.half_width[axis], kLeastSlack);
+      const double farthest = plan->travel_cells + slack + options.sure_overtravel_cells;
       const double nearest = plan->travel_cells - fit.half_width[axis];
       const MotionReport report =
           mover.Probe(plan->direction, from + SignOf(plan->direction) * farthest, "confirm",

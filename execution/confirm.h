@@ -37,9 +37,9 @@ struct Region {
   Eigen::Vector3d upper = Eigen::Vector3d::Zero();
 };
 
-/// Touches along the axes across `insertion` that the fit leaves wider than the limit, until none is (or attempts run
-/// out); adds to the evidence. Returns the last fit: of a target in `likely` (around the hypotheses left), or, if that
-/// leaves touches unexplained, the better one in `possible` (around the start belief).
+/// Touches along the axes across `insertion` that no face has pinned, until none is left (or attempts run out); adds to
+/// the evidence. Returns the last fit: of a target in `likely` (around the hypotheses left), or, if that leaves touches
+/// unexplained, the better one in `possible` (around the start belief).
 TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orientation, const Region& likely,
                   const Region& possible, Mover& mover, std::vector<Touch>& evidence);
 

@@ -122,7 +122,7 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
       continue;
     }
     for (int axis = 0; axis < 2; ++axis) {
-      EXPECT_LE(record.half_width_m[static_cast<std::size_t>(axis)], ExecutorOptions{}.confirm_limit_m);
+      EXPECT_LE(record.half_width_m[static_cast<std::size_t>(axis)], 0.0005);
     }
     lateral.push_back(worst);
     moves += static_cast<double>(record.moves.size());
