@@ -9,7 +9,7 @@ namespace feeler::planner {
 
 CertificateHeuristic::CertificateHeuristic(const HypothesisSets& sets, std::shared_ptr<const CertificateTable> table,
                                            std::shared_ptr<const PairCertificates> pairs)
-    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs)) {
+    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs), table_->neighbours()) {
   uniform_ = sets_.uniform();
 }
 

@@ -14,6 +14,13 @@ constexpr std::uint32_t kInfinite = ~std::uint32_t{0};
 constexpr int kBorder = 2;
 constexpr std::uint32_t kUnitsPerStep = 16;
 
+/// A hypothesis without these is a run of one along every axis.
+std::array<Cell, 6> UnitNeighbours() {
+  std::array<Cell, 6> neighbours;
+  for (const Direction d : kDirections) neighbours[static_cast<std::size_t>(IndexOf(d))] = UnitCell(d);
+  return neighbours;
+}
+
 }  // namespace
 
 LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread) {
@@ -147,7 +154,7 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
 
 LineHeuristic::LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table,
                              std::shared_ptr<const PairCertificates> pairs)
-    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs)) {}
+    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs), UnitNeighbours()) {}
 
 const LineHeuristic::Runs& LineHeuristic::Prepare(SetId set) {
   if (set >= runs_of_.size()) runs_of_.resize(sets_.count());

@@ -26,12 +26,9 @@ const PairCertificates::Plane& PairCertificates::Get(const Cell& offset, int ori
   return *plane;
 }
 
-IsolatedHypotheses::IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs)
-    : sets_(sets), pairs_(std::move(pairs)) {
-  for (const Direction d : kDirections) {
-    neighbours_[static_cast<std::size_t>(IndexOf(d))] = (pairs_->spread()[AxisOf(d)] + 1) * UnitCell(d);
-  }
-}
+IsolatedHypotheses::IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs,
+                                       const std::array<Cell, 6>& neighbours)
+    : sets_(sets), pairs_(std::move(pairs)), neighbours_(neighbours) {}
 
 const IsolatedHypotheses::Terms& IsolatedHypotheses::Prepare(SetId set) {
   if (set >= terms_of_.size()) terms_of_.resize(sets_.count());

@@ -40,14 +40,17 @@ class PairCertificates {
   mutable std::map<std::array<int, 4>, std::unique_ptr<const Plane>> planes_;
 };
 
-/// Lower bounds for the *isolated* hypotheses of a belief, those that have no axis neighbour in it, on which heuristics
-/// that look along the axes are silent: each must be told apart from the nearest other hypothesis.
+/// Lower bounds for the *isolated* hypotheses of a belief, those that have no neighbour at the given offsets in it, on
+/// which heuristics that look at those neighbours are silent: each must be told apart from the nearest other
+/// hypothesis.
 ///
 /// Admissible: under h the policy's walk must tell h from every other hypothesis left out of its goal. Consistent: in a
-/// subset that still holds both, the nearest is the same.
+/// subset that still holds both, the nearest is the same. Added to another bound it stays so if that one counts nothing
+/// for isolated hypotheses.
 class IsolatedHypotheses {
  public:
-  IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs);
+  IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs,
+                     const std::array<Cell, 6>& neighbours);
 
   /// Sum over the isolated hypotheses of weight * bound; infinity if a pair cannot be told apart.
   double Weighted(SetId set, const Cell& robot);

@@ -13,16 +13,18 @@ namespace feeler::planner::testing {
 /// A plug-like task without models: the configuration-space obstacle of a plug and a housing is a box of 82 x 66 x 30
 /// mm on a panel, at 2 mm cells, walls at mid-cell. Closed: the box is solid. Open: a hole one cell wide and ten deep
 /// in its middle.
-/// `half`: half extents of the box along x and y, its height along z.
-inline std::shared_ptr<const ContactMap> MakePlugMap(bool open = false, const Cell& half = Cell(20, 16, 15)) {
+/// `half`: half extents of the box along x and y, its height along z. `cut`: cells taken off its upright corners, by a
+/// wall at 45 degrees.
+inline std::shared_ptr<const ContactMap> MakePlugMap(bool open = false, const Cell& half = Cell(20, 16, 15),
+                                                     int cut = 0) {
   const CellBox domain{-half - Cell(22, 22, 3), half + Cell(22, 22, 19)};
   const auto blocked = [&](const Cell& d) {
     if (d.z() < -half.z()) return true;  // the panel
-    const bool in_box = std::abs(d.x()) <= half.x() && std::abs(d.y()) <= half.y() && d.z() < 0;
+    const int beyond = std::abs(d.x()) + std::abs(d.y()) - (half.x() + half.y() - cut);
+    const bool in_box = std::abs(d.x()) <= half.x() && std::abs(d.y()) <= half.y() && d.z() < 0 && beyond <= 0;
     const bool in_hole = open && d.x() == 0 && d.y() == 0 && d.z() >= -10;
     return in_box && !in_hole;
   };
-  const Cell size = domain.Size();
   const auto count = static_cast<std::size_t>(domain.Count());
   ContactMap::Layer layer;
   layer.blocked.resize(count);
@@ -47,7 +49,6 @@ inline std::shared_ptr<const ContactMap> MakePlugMap(bool open = false, const Ce
       }
     }
   }
-  static_cast<void>(size);
   std::vector<ContactMap::Layer> layers;
   layers.push_back(std::move(layer));
   return std::make_shared<ContactMap>(domain, std::move(layers), Eigen::Vector3d(0.0, 0.0, 0.5), 0.5);
