@@ -148,8 +148,9 @@ std::string MakeText(const DatabaseTable& table, const std::vector<Measured>& me
   text += fmt::format(
       "\nspeed: sum over attempts of {0} / of the row. An attempt without a policy counts with what it had used when\n"
       "  its limit struck: >= only {0} was cut short, <= only the row was, ~ both (the true ratio may lie either way)\n"
-      "cost: mean ratio to {0} over the attempts that both solved (how many); cost rest: to {1} where {0} has no\n"
-      "  policy; certified: to {1} over all solved attempts. printed: the paper's value (500 s an attempt)\n",
+      "cost: mean ratio to {0} over the attempts that both solved (how many)\n"
+      "cost rest: mean ratio to {1} over the solved attempts where {0} has no policy; certified: over all solved\n"
+      "printed: the paper's value (500 s an attempt, its own task and machine)\n",
       table.rows[table.base].solver.label, table.rows[table.reference].solver.label);
   return text;
 }
