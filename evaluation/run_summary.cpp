@@ -18,7 +18,7 @@ RunSummary Summarize(const std::vector<EpisodeSummaryRow>& rows) {
     if (row.inserted) {
       times.push_back(row.sim_time_s);
     } else {
-      ++summary.failures[row.reason];
+      ++summary.failures[row.reason.substr(0, row.reason.find(':'))];  // what follows differs from episode to episode
     }
     moves.push_back(row.moves);
     contacts.push_back(row.contacts);

@@ -22,7 +22,7 @@ struct RunSummary {
   double path_length_mean_m = 0.0;
   double peak_force_max_n = 0.0;
   double plan_cpu_s = 0.0;              ///< mean per episode
-  std::map<std::string, int> failures;  ///< reason -> episodes not inserted
+  std::map<std::string, int> failures;  ///< kind of reason (up to its colon) -> episodes not inserted
 };
 
 RunSummary Summarize(const std::vector<EpisodeSummaryRow>& rows);
