@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstdlib>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <tuple>
@@ -16,6 +18,8 @@ namespace {
 
 /// How far ahead of the first open problem a thread looks for one whose experience is ready.
 constexpr std::size_t kLookAhead = 256;
+/// Budget of the certified solver for a problem where none is given.
+constexpr std::int64_t kDefaultExpansionLimit = 20000;
 
 class Framework {
  public:
@@ -32,6 +36,10 @@ class Framework {
     solver_.on_bounds = nullptr;
     solver_.cancellation = options.cancellation;
     Validate(solver_);
+    if (solver_.solver == SolverKind::kCertified && std::isinf(solver_.time_limit_s) &&
+        solver_.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
+      solver_.expansion_limit = kDefaultExpansionLimit;
+    }
     needs_experience_ = solver_.solver == SolverKind::kERtdpBel && options.experience != ExperienceKind::kNone;
   }
 

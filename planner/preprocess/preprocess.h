@@ -25,7 +25,9 @@ class PolicySink {
 };
 
 struct PreprocessOptions {
-  SolverOptions solver;  ///< cancellation and on_bounds of it are ignored
+  /// Cancellation and on_bounds of it are ignored. The certified solver without a time or expansion limit is given
+  /// 20,000 expansions a problem, so that one problem whose gap cannot be closed never holds up the family.
+  SolverOptions solver;
   ProblemOrder order = ProblemOrder::kUncertainty;
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
   std::uint64_t seed = 1;                                ///< of the random order

@@ -1,5 +1,6 @@
 #include "planner/solver/planning_tables.h"
 
+#include "planner/contact/fill_dead_ends.h"
 #include "planner/heuristic/certificate.h"
 
 namespace feeler::planner {
@@ -12,7 +13,9 @@ Cell SpreadOf(const Problem& problem) {
 }  // namespace
 
 PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options)
-    : map_(problem.map), masks_(*problem.map) {
+    : map_(problem.map), problem_(problem), options_(options), masks_(*problem.map) {
+  options_.cancellation = nullptr;
+  options_.on_bounds = nullptr;
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
   pairs_ = std::make_shared<PairCertificates>(problem.map, costs, SpreadOf(problem));
   switch (options.heuristic) {
@@ -26,6 +29,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
     case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
+  if (options.solver == SolverKind::kCertified && problem.generous_workspace) filled();
 }
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
@@ -34,6 +38,17 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& pr
   if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
   return std::make_unique<CertificateHeuristic>(sets, certificate_, pairs_);
+}
+
+const PlanningTables::Filled& PlanningTables::filled() const {
+  std::call_once(filled_once_, [&] {
+    filled_.map = FillDeadEnds(*map_);
+    if (!filled_.map) return;
+    Problem problem = problem_;
+    problem.map = filled_.map;
+    filled_.tables = std::make_shared<const PlanningTables>(problem, options_);
+  });
+  return filled_;
 }
 
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options) {

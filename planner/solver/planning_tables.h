@@ -1,14 +1,15 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 
 #include "planner/belief/contact_masks.h"
 #include "planner/heuristic/belief_heuristic.h"
 #include "planner/heuristic/certificate_table.h"
 #include "planner/heuristic/first_contact.h"
 #include "planner/heuristic/lines.h"
-#include "planner/heuristic/pair_certificates.h"
 #include "planner/heuristic/local_certificate.h"
+#include "planner/heuristic/pair_certificates.h"
 #include "planner/solver/solve.h"
 
 namespace feeler::planner {
@@ -21,14 +22,26 @@ class PlanningTables {
   /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
   std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets) const;
 
+  /// The map with its dead ends filled (see FillDeadEnds) and the tables for it; null if it has none. Made with the
+  /// tables of tasks for the certified solver, else when first asked for. Safe to call from many threads.
+  struct Filled {
+    std::shared_ptr<const ContactMap> map;
+    std::shared_ptr<const PlanningTables> tables;
+  };
+  const Filled& filled() const;
+
  private:
   std::shared_ptr<const ContactMap> map_;
+  Problem problem_;  ///< whose costs, goal and move lengths the tables are for
+  SolverOptions options_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;
   std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then
+  mutable std::once_flag filled_once_;
+  mutable Filled filled_;
 };
 
 }  // namespace feeler::planner

@@ -1,12 +1,14 @@
 #include "planner/solver/solve.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "core/error.h"
 #include "planner/belief/belief_graph.h"
 #include "planner/solver/bounded_search.h"
+#include "planner/solver/carried_policy.h"
 #include "planner/solver/experience.h"
 #include "planner/solver/fewest_moves.h"
 #include "planner/solver/freeze_policy.h"
@@ -20,6 +22,8 @@ namespace feeler::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Up to so many hypotheses the greedy policy is tried beside one that is carried over.
+constexpr std::uint32_t kGreedyBesideCarried = 256;
 
 /// epsilon * heur, times the weight of the belief.
 struct InflatedHeuristic {
@@ -33,7 +37,11 @@ class Attempt {
  public:
   Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
           const Experience& experience, bool canonical)
-      : options_(options), experience_(experience), watch_(options), graph_(problem, tables.masks(), canonical) {
+      : options_(options),
+        experience_(experience),
+        tables_(tables),
+        watch_(options),
+        graph_(problem, tables.masks(), canonical) {
     heuristic_ = tables.MakeHeuristic(problem, graph_.sets());
     graph_.SetHeuristic(heuristic_.get());
     result_.expected_cost = kInfinity;
@@ -95,13 +103,49 @@ class Attempt {
     }
   }
 
-  /// A first policy by greedy completion, then BoundedSearch until the gap is closed. A complete policy comes first:
-  /// greedy completion is not interrupted by limits.
+  /// A first policy, then BoundedSearch until the gap is closed. A complete policy comes first: it is not interrupted
+  /// by limits.
   void RunCertified() {
-    GreedyCompletion greedy(graph_);
-    greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); });
     result_.lower_bound = graph_.Heuristic(start_) / weight_;
-    CloseGap(greedy, 0);
+    GreedyCompletion greedy(graph_);
+    if (const std::optional<Policy> policy = PolicyWithoutDeadEnds()) {
+      CarriedPolicy carried(graph_, *policy, greedy);
+      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideCarried) Complete(greedy);
+      CloseGap(carried, 0);
+    } else {
+      Complete(greedy);
+      CloseGap(greedy, 0);
+    }
+  }
+
+  void Complete(GreedyCompletion<BeliefGraph>& greedy) {
+    greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); });
+  }
+
+  /// Dead ends make beliefs many and the greedy choice short-sighted (it looks into them one by one). A policy that
+  /// knows nothing of them is nearly as good, and far easier to find.
+  std::optional<Policy> PolicyWithoutDeadEnds() {
+    const Problem& problem = graph_.problem();
+    if (!problem.generous_workspace) return std::nullopt;
+    const PlanningTables::Filled& filled = tables_.filled();
+    if (!filled.map) return std::nullopt;
+    Problem without = problem;
+    without.map = filled.map;
+    without.generous_workspace = false;  // what leaves the workspace is found later
+    for (const Hypothesis& h : problem.hypotheses) {
+      if (Blocked(without, problem.start, h)) return std::nullopt;
+    }
+    BeliefGraph graph(without, filled.tables->masks(), graph_.canonical());
+    const auto heuristic = filled.tables->MakeHeuristic(problem, graph.sets());
+    graph.SetHeuristic(heuristic.get());
+    const BeliefId start = graph.Start();
+    if (start == kNoBelief || std::isinf(graph.Heuristic(start))) return std::nullopt;
+    GreedyCompletion greedy(graph);
+    greedy.Run(start, [](std::int64_t) { return std::optional<SolverStatus>(); });
+    return FreezePolicy(graph, [&](BeliefId b) {
+      const BeliefAction& action = graph.Actions(b)[static_cast<std::size_t>(greedy.Action(b))];
+      return GuardedMove{action.direction, action.cells};
+    });
   }
 
   template <class Incumbent>
@@ -151,6 +195,7 @@ class Attempt {
 
   const SolverOptions& options_;
   const Experience& experience_;
+  const PlanningTables& tables_;
   StopWatch watch_;
   BeliefGraph graph_;
   std::unique_ptr<BeliefHeuristic> heuristic_;
