@@ -40,6 +40,7 @@ Measured Measure(const SolverSweep& sweep, const DatabaseTable& table, std::size
   measured.success = WilsonRate(solved, attempts);
   measured.limited = attempts - solved;
   measured.speedup = SpeedupOf(base, records);
+  if (row == table.base) measured.speedup.bound = BoundKind::kExact;  // 1 by definition
   measured.cost = RelativeCostOf(base, records);
   measured.rest_cost = RelativeCostOfRest(reference, base, records);
   measured.reference_cost = RelativeCostOf(reference, records);
