@@ -10,7 +10,7 @@
 namespace feeler::planner {
 namespace {
 
-/// Where contacts cost something, table units per free step.
+/// Where costs are no multiples of a free step's, table units per free step.
 constexpr std::uint32_t kUnitsPerStep = 64;
 
 }  // namespace
@@ -20,13 +20,21 @@ StepCosts LowerStepCosts(const CostWeights& cost, int longest_move) {
   return {cost.per_cell + share, cost.per_contact + share};
 }
 
+StepCosts MotionCosts(const CostWeights& cost, int longest_move) {
+  if (cost.per_cell <= 0.0) return LowerStepCosts(cost, longest_move);
+  return {cost.per_cell, cost.per_contact, cost.per_action};
+}
+
 CertificateGrid::CertificateGrid(const ContactMap& map, const StepCosts& costs, const Cell& reach)
     : domain{map.domain().min - reach - Cell::Ones(), map.domain().max + reach + Cell::Ones()},
       size(domain.Size()),
       cells(static_cast<std::size_t>(domain.Count())) {
-  free_units = costs.contact > 0.0 ? kUnitsPerStep : 1;
+  const auto whole = [&](double x) { return std::fmod(x, costs.free) == 0.0; };
+  free_units = whole(costs.contact) && whole(costs.start) ? 1 : kUnitsPerStep;
   unit = costs.free / free_units;
-  contact_units = static_cast<std::uint32_t>(std::min(60000.0, std::floor(costs.contact / unit)));
+  const auto units = [&](double x) { return static_cast<std::uint32_t>(std::min(60000.0, std::floor(x / unit))); };
+  contact_units = units(costs.contact);
+  start_units = units(costs.start);
 }
 
 void TableCertificates(const ContactMap& map, int orientation, const CertificateGrid& grid,
@@ -35,6 +43,7 @@ void TableCertificates(const ContactMap& map, int orientation, const Certificate
   CertificateWalks walks;
   walks.strides = grid.strides();
   walks.step_cost = grid.free_units;
+  walks.start_cost = grid.start_units;
   walks.enters.assign(grid.cells, 0);
   const CellBox& domain = grid.domain;
   for (int z = domain.min.z(); z <= domain.max.z(); ++z) {
@@ -57,8 +66,7 @@ void TableCertificates(const ContactMap& map, int orientation, const Certificate
           }
           // A free step out of the domain shows what its projection, staying in place, would show.
           if (shows == 0) continue;
-          const std::uint32_t cost = to == from ? std::min(grid.free_units, grid.contact_units) : grid.free_units;
-          walks.probes.push_back({from, to, cost, shows});
+          walks.probes.push_back({from, to, free ? grid.free_units : grid.contact_units, d, !free, shows});
         }
       }
     }

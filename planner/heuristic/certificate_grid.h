@@ -17,8 +17,13 @@ namespace feeler::planner {
 struct StepCosts {
   double free = 1.0;
   double contact = 0.0;
+  double start = 0.0;
 };
 StepCosts LowerStepCosts(const CostWeights& cost, int longest_move);
+/// Costs of walks made of motions: a motion costs `start`, goes straight on and ends at will or by a contact. A guarded
+/// move is a motion at just its cost, so bounds from these are tighter than from shares wherever per_action is not
+/// zero. Where cells are free of cost the shares above stand.
+StepCosts MotionCosts(const CostWeights& cost, int longest_move);
 
 /// The displacements for which certificates are tabled, and the unit of the tables. Two cells beyond all that a walk
 /// could meet, everything repeats for ever and a walk can be projected back.
@@ -39,6 +44,7 @@ struct CertificateGrid {
   std::size_t cells = 0;
   std::uint32_t free_units = 1;  ///< of a free step
   std::uint32_t contact_units = 0;
+  std::uint32_t start_units = 0;
   double unit = 1.0;  ///< cost in problem units of one unit of the tables
 };
 

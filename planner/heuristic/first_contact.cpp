@@ -33,7 +33,7 @@ FirstContactTable::FirstContactTable(const ContactMap& map, const StepCosts& cos
                   static_cast<std::uint8_t>(1U << IndexOf(d));
             }
           }
-          if (contact) walks.probes.push_back({cell, cell, 0, 1});
+          if (contact) walks.probes.push_back({cell, cell, 0, Direction::kPlusX, true, 1});
         }
       }
     }

@@ -8,7 +8,6 @@
 namespace feeler::planner {
 namespace {
 
-constexpr std::uint32_t kUnitsPerStep = 64;
 constexpr int kMostBits = 8;
 constexpr int kFewestBits = 3;
 
@@ -42,16 +41,19 @@ LocalCertificateTable::LocalCertificateTable(const Problem& problem, const StepC
     if (nearest.size() > static_cast<std::size_t>(bits_)) nearest.resize(static_cast<std::size_t>(bits_));
     for (const auto& [distance, j] : nearest) others_[i].push_back(j);
   }
-  const std::uint32_t free_units = costs.contact > 0.0 ? kUnitsPerStep : 1;
-  unit_ = costs.free / free_units;
-  const auto contact_units = static_cast<std::uint32_t>(std::min(60000.0, std::floor(costs.contact / unit_)));
+  // The units of the grid tables serve here too.
+  const CertificateGrid units(*problem.map, costs, Cell::Zero());
+  unit_ = units.unit;
   values_.assign((plane_size_ * n) << bits_, 0);
-  for (std::size_t i = 0; i < n; ++i) Fill(problem, static_cast<int>(i), free_units, contact_units);
+  for (std::size_t i = 0; i < n; ++i) {
+    Fill(problem, static_cast<int>(i), units.free_units, units.contact_units, units.start_units);
+  }
 }
 
 void LocalCertificateTable::Fill(const Problem& problem, int hypothesis, std::uint32_t free_units,
-                                 std::uint32_t contact_units) {
+                                 std::uint32_t contact_units, std::uint32_t start_units) {
   CertificateWalks walks;
+  walks.start_cost = start_units;
   walks.step_cost = free_units;
   walks.strides = {1, size_.x(), std::int64_t{size_.x()} * size_.y()};
   walks.enters.assign(plane_size_, 0);
@@ -77,7 +79,7 @@ void LocalCertificateTable::Fill(const Problem& problem, int hypothesis, std::ui
                                             SignOf(d) * walks.strides[static_cast<std::size_t>(AxisOf(d))]);
             walks.enters[to] |= static_cast<std::uint8_t>(1U << IndexOf(d));
           }
-          if (shows != 0) walks.probes.push_back({from, to, free ? free_units : contact_units, shows});
+          if (shows != 0) walks.probes.push_back({from, to, free ? free_units : contact_units, d, !free, shows});
         }
       }
     }

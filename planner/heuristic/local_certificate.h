@@ -38,7 +38,8 @@ class LocalCertificateTable {
   }
 
  private:
-  void Fill(const Problem& problem, int hypothesis, std::uint32_t free_units, std::uint32_t contact_units);
+  void Fill(const Problem& problem, int hypothesis, std::uint32_t free_units, std::uint32_t contact_units,
+            std::uint32_t start_units);
 
   CellBox workspace_;
   Cell size_;

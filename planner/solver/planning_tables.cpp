@@ -17,13 +17,14 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
   options_.cancellation = nullptr;
   options_.on_bounds = nullptr;
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
-  pairs_ = std::make_shared<PairCertificates>(problem.map, costs, SpreadOf(problem));
+  const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths.back());
+  pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
   switch (options.heuristic) {
     case HeuristicKind::kCertificate:
       if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
-        local_certificate_ = std::make_shared<LocalCertificateTable>(problem, costs);
+        local_certificate_ = std::make_shared<LocalCertificateTable>(problem, motions);
       } else {
-        certificate_ = std::make_shared<CertificateTable>(*problem.map, costs, SpreadOf(problem));
+        certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
       }
       break;
     case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
