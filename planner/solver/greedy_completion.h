@@ -27,7 +27,8 @@ class GreedyCompletion {
 
   explicit GreedyCompletion(Model& model) : model_(model) {}
 
-  /// Finds a policy from `start`; nothing is kept of beliefs in work when `stop(expansions)` interrupts.
+  /// Finds a policy from `start`; kUnlocalizable if there is none by the heuristic. Nothing is kept of beliefs in work
+  /// when `stop(expansions)` interrupts.
   template <class Stop>
   std::optional<SolverStatus> Run(Belief start, Stop stop) {
     std::vector<Belief> open = {start};
@@ -132,6 +133,7 @@ class GreedyCompletion {
         queue.emplace(value, only);
       }
     }
+    if (last.second < 0) return SolverStatus::kUnlocalizable;  // no split within reach leads to finite values
     Plan plan;
     for (std::pair<Belief, int> step = last;; step = {reached.at(step.first).from, reached.at(step.first).action}) {
       plan.path.push_back(step);

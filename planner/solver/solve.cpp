@@ -110,16 +110,23 @@ class Attempt {
     GreedyCompletion greedy(graph_);
     if (const std::optional<Policy> policy = PolicyWithoutDeadEnds()) {
       CarriedPolicy carried(graph_, *policy, greedy);
-      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideCarried) Complete(greedy);
-      CloseGap(carried, 0);
-    } else {
-      Complete(greedy);
+      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideCarried || !carried.Solved(start_)) {
+        Complete(greedy);
+      }
+      if (carried.Solved(start_)) CloseGap(carried, 0);
+    } else if (Complete(greedy)) {
       CloseGap(greedy, 0);
     }
   }
 
-  void Complete(GreedyCompletion<BeliefGraph>& greedy) {
-    greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); });
+  /// False, and says so in the result, if some hypotheses cannot be told apart.
+  bool Complete(GreedyCompletion<BeliefGraph>& greedy) {
+    if (!greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); })) return true;
+    result_.status = SolverStatus::kUnlocalizable;
+    result_.expansions = greedy.expansions();
+    result_.lower_bound = kInfinity;
+    result_.indistinguishable = IndistinguishablePairs(graph_.problem(), tables_.masks());
+    return false;
   }
 
   /// Dead ends make beliefs many and the greedy choice short-sighted (it looks into them one by one). A policy that
@@ -141,7 +148,7 @@ class Attempt {
     const BeliefId start = graph.Start();
     if (start == kNoBelief || std::isinf(graph.Heuristic(start))) return std::nullopt;
     GreedyCompletion greedy(graph);
-    greedy.Run(start, [](std::int64_t) { return std::optional<SolverStatus>(); });
+    if (greedy.Run(start, [](std::int64_t) { return std::optional<SolverStatus>(); })) return std::nullopt;
     return FreezePolicy(graph, [&](BeliefId b) {
       const BeliefAction& action = graph.Actions(b)[static_cast<std::size_t>(greedy.Action(b))];
       return GuardedMove{action.direction, action.cells};

@@ -1,8 +1,12 @@
 // Laws of planning with an opening that is left open: filling dead ends gives the map of the closed opening, and
 // nothing where there is none; certified policies are valid at their stated cost, above their bound, and cost at
-// most 1.02 times the closed ones, whatever stops the search.
+// most 1.02 times the closed ones, whatever stops the search. Tasks that cannot be localized are reported with the
+// pairs of hypotheses.
 
 #include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
 
 #include "planner/contact/fill_dead_ends.h"
 #include "planner/preprocess/problem_family.h"
@@ -50,6 +54,18 @@ TEST(OpenOpening, CostsNoMoreThanClosed) {
     const SolverResult reference = Solve(MakeCuboidProblem(task, closed, extents), options, closed_tables);
     EXPECT_LE(result.expected_cost, 1.02 * reference.expected_cost);
   }
+}
+
+TEST(Unlocalizable, TaskIsReportedWithItsPairs) {
+  // The ends of the walls along y are out of reach: nothing tells that coordinate.
+  Task task = testing::MakePlugTask();
+  task.workspace_m = Eigen::Vector3d(0.04, 0.04, 0.04);
+  const auto map = testing::MakePlugMap(false, {4, 60, 4});
+  SolverOptions options;
+  const SolverResult result = Solve(MakeCuboidProblem(task, map, {2, 2, 1}), options);
+  EXPECT_FALSE(result.complete());
+  EXPECT_EQ(result.status, SolverStatus::kUnlocalizable);
+  EXPECT_EQ(result.indistinguishable, (std::vector<std::pair<int, int>>{{0, 1}, {2, 3}}));
 }
 
 }  // namespace
