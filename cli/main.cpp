@@ -17,6 +17,22 @@ extern "C" void OnInterrupt(int signal_number) {
   std::signal(signal_number, SIG_DFL);  // a second Ctrl-C ends at once
 }
 
+/// CLI11 says of an unknown command that one is required; we name it and list the known.
+void RequireKnownCommands(CLI::App& app, int argc, char** argv) {
+  CLI::App* level = &app;
+  for (int i = 1; i < argc; ++i) {
+    const auto known = level->get_subcommands([](const CLI::App*) { return true; });
+    if (known.empty() || argv[i][0] == '-') return;
+    if (CLI::App* next = level->get_subcommand_no_throw(argv[i])) {
+      level = next;
+      continue;
+    }
+    std::string names;
+    for (const CLI::App* command : known) names += (names.empty() ? "" : ", ") + command->get_name();
+    throw feeler::InputError("command line", fmt::format("unknown command \"{}\"", argv[i]), "choose one of " + names);
+  }
+}
+
 int Fail(const char* message, int code) {
   fmt::print(stderr, "feeler: error: {}\n", message);
   return code;
@@ -44,6 +60,7 @@ int main(int argc, char** argv) {
   feeler::cli::AddExperimentCommand(app, session);
 
   try {
+    RequireKnownCommands(app, argc, argv);
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {
     return app.exit(e);  // --help, --version

@@ -19,8 +19,8 @@ Rate WilsonRate(int successes, int trials) {
   const double centre = (p + kZ * kZ / (2 * n)) / denominator;
   const double half = kZ / denominator * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
   rate.value = p;
-  rate.low = std::max(0.0, centre - half);
-  rate.high = std::min(1.0, centre + half);
+  rate.low = successes == 0 ? 0.0 : std::max(0.0, centre - half);
+  rate.high = successes == trials ? 1.0 : std::min(1.0, centre + half);
   return rate;
 }
 

@@ -151,7 +151,7 @@ Image Frame(int width, int height, int shade) {
 }
 
 TEST(Video, IsPlayableAndComplete) {
-  const TemporaryFolder folder("feeler_video");
+  const TemporaryFolder folder("feeler_video_written");
   const std::string path = folder / "a 'b' $c.mp4";  // no shell is between us and the name
   VideoOptions options;
   options.width = 64;
@@ -177,7 +177,7 @@ TEST(Video, IsPlayableAndComplete) {
 }
 
 TEST(Video, LeavesNothingBehindWhenItIsNotFinished) {
-  const TemporaryFolder folder("feeler_video");
+  const TemporaryFolder folder("feeler_video_unfinished");
   VideoOptions options;
   options.width = 64;
   options.height = 48;
@@ -198,7 +198,7 @@ TEST(Video, LeavesNothingBehindWhenItIsNotFinished) {
 }
 
 TEST(Video, SaysThatFfmpegIsMissing) {
-  const TemporaryFolder folder("feeler_video");
+  const TemporaryFolder folder("feeler_video_refused");
   const std::string path = std::getenv("PATH");
   setenv("PATH", "/nonexistent", 1);
   EXPECT_THROW(VideoWriter(folder / "a.mp4"), InputError);
