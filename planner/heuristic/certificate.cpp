@@ -18,17 +18,25 @@ const CertificateHeuristic::Terms& CertificateHeuristic::Prepare(SetId set) {
   Terms& terms = terms_[set];
   if (terms.ready) return terms;
   terms.ready = true;
-  terms.first = static_cast<std::uint32_t>(offsets_.size());
-  terms.count = sets_.info(set).size;
+  terms.first = static_cast<std::uint32_t>(uniform_ ? runs_.size() : offsets_.size());
   NeighbourMasks(sets_, set, table_->neighbours(), masks_);
   const auto strides = table_->grid().strides();
   const auto plane = static_cast<std::int64_t>(table_->grid().cells);
   std::size_t k = 0;
   sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
-    offsets_.push_back((std::int64_t{orientation} * CertificateTable::kMasks + masks_[k++]) * plane -
-                       (h.x() * strides[0] + h.y() * strides[1] + h.z() * strides[2]));
-    if (!uniform_) weights_.push_back(sets_.Weight(layer, bit));
+    const std::int64_t offset = (std::int64_t{orientation} * CertificateTable::kMasks + masks_[k++]) * plane -
+                                (h.x() * strides[0] + h.y() * strides[1] + h.z() * strides[2]);
+    if (!uniform_) {
+      offsets_.push_back(offset);
+      weights_.push_back(sets_.Weight(layer, bit));
+    } else if (runs_.size() > terms.first && runs_.back().first == offset + 1) {
+      runs_.back().first = offset;
+      ++runs_.back().length;
+    } else {
+      runs_.push_back({offset, 1});
+    }
   });
+  terms.count = static_cast<std::uint32_t>(uniform_ ? runs_.size() : offsets_.size()) - terms.first;
   return terms;
 }
 
@@ -46,18 +54,21 @@ double CertificateHeuristic::Neighbours(SetId set, const Cell& robot) {
   const auto base = static_cast<std::int64_t>(table_->grid().Index(robot - info.low)) +
                     (info.low.x() * table_->grid().strides()[0] + info.low.y() * table_->grid().strides()[1] +
                      info.low.z() * table_->grid().strides()[2]);
-  const std::int64_t* const offsets = offsets_.data() + terms.first;
   if (uniform_) {
     std::uint64_t sum = 0;
     std::uint32_t worst = 0;
-    for (std::uint32_t i = 0; i < terms.count; ++i) {
-      const std::uint32_t value = values[base + offsets[i]];
-      worst = worst > value ? worst : value;
-      sum += value;
+    for (std::uint32_t i = terms.first; i < terms.first + terms.count; ++i) {
+      const std::uint16_t* const run = values + base + runs_[i].first;
+      for (std::uint32_t j = 0; j < runs_[i].length; ++j) {
+        const std::uint32_t value = run[j];
+        worst = worst > value ? worst : value;
+        sum += value;
+      }
     }
     if (worst == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
     return static_cast<double>(sum) * table_->grid().unit;
   }
+  const std::int64_t* const offsets = offsets_.data() + terms.first;
   double sum = 0.0;
   for (std::uint32_t i = 0; i < terms.count; ++i) {
     const std::uint16_t value = values[base + offsets[i]];

@@ -19,11 +19,17 @@ class CertificateHeuristic final : public BeliefHeuristic {
   double Weighted(SetId set, const Cell& robot) override;
   std::size_t bytes() const override {
     return terms_.capacity() * sizeof(Terms) + offsets_.capacity() * sizeof(std::int64_t) +
-           weights_.capacity() * sizeof(double) + isolated_.bytes();
+           runs_.capacity() * sizeof(Run) + weights_.capacity() * sizeof(double) + isolated_.bytes();
   }
 
  private:
-  /// One hypothesis: where its value lies relative to the robot's place in plane 0.
+  /// Values of hypotheses that are neighbours along x and look at the same neighbours lie side by side; `first` is
+  /// where they begin relative to the robot's place in plane 0.
+  struct Run {
+    std::int64_t first = 0;
+    std::uint32_t length = 0;
+  };
+  /// Of a set: its runs for a uniform prior, else its hypotheses one by one.
   struct Terms {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
@@ -37,8 +43,9 @@ class CertificateHeuristic final : public BeliefHeuristic {
   std::shared_ptr<const CertificateTable> table_;
   IsolatedHypotheses isolated_;
   std::vector<Terms> terms_;
+  std::vector<Run> runs_;
   std::vector<std::int64_t> offsets_;
-  std::vector<double> weights_;  ///< beside `offsets_` for a prior that is not uniform
+  std::vector<double> weights_;  ///< beside `offsets_`
   std::vector<std::uint8_t> masks_;
   std::vector<Slab> scratch_;
   bool uniform_ = true;
