@@ -21,14 +21,18 @@ extern "C" void OnInterrupt(int signal_number) {
 void RequireKnownCommands(CLI::App& app, int argc, char** argv) {
   CLI::App* level = &app;
   for (int i = 1; i < argc; ++i) {
-    const auto known = level->get_subcommands([](const CLI::App*) { return true; });
+    const auto known = level->get_subcommands([](CLI::App*) { return true; });
     if (known.empty() || argv[i][0] == '-') return;
-    if (CLI::App* next = level->get_subcommand_no_throw(argv[i])) {
+    CLI::App* next = nullptr;
+    std::string names;
+    for (CLI::App* command : known) {
+      if (command->get_name() == argv[i]) next = command;
+      names += (names.empty() ? "" : ", ") + command->get_name();
+    }
+    if (next != nullptr) {
       level = next;
       continue;
     }
-    std::string names;
-    for (const CLI::App* command : known) names += (names.empty() ? "" : ", ") + command->get_name();
     throw feeler::InputError("command line", fmt::format("unknown command \"{}\"", argv[i]), "choose one of " + names);
   }
 }
