@@ -13,7 +13,9 @@ if(FEELER_WERROR)
   target_compile_options(feeler_options INTERFACE -Werror)
 endif()
 if(FEELER_SANITIZE)
-  target_compile_options(feeler_options INTERFACE -fsanitize=${FEELER_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  # -Wmaybe-uninitialized reports false positives in instrumented code (the GCC manual says so).
+  target_compile_options(feeler_options INTERFACE -fsanitize=${FEELER_SANITIZE} -fno-omit-frame-pointer
+                         -fno-sanitize-recover=all -Wno-maybe-uninitialized)
   target_link_options(feeler_options INTERFACE -fsanitize=${FEELER_SANITIZE})
 endif()
 
