@@ -12,46 +12,11 @@
 #include <utility>
 
 #include "core/error.h"
-#include "planner/solver/evaluate.h"
+#include "policies/storage/database_sink.h"
+#include "policies/storage/verify.h"
 
 namespace feeler::workflow {
 namespace {
-
-class DatabaseSink final : public planner::PolicySink {
- public:
-  DatabaseSink(policies::Database& database, const planner::PreprocessOptions& options)
-      : database_(database), options_(options) {}
-
-  bool Done(const planner::Extents& extents) override { return database_.Contains(extents); }
-
-  std::optional<planner::Policy> Load(const planner::Extents& extents) override {
-    const auto stored = database_.Get(extents);
-    return stored ? stored->policy : std::nullopt;
-  }
-
-  void Store(const planner::Extents& extents, const planner::Problem& /*problem*/,
-             const planner::SolverResult& result) override {
-    policies::StoredProblem stored;
-    stored.extents = extents;
-    stored.status = planner::ToString(result.status);
-    stored.solver = planner::ToString(options_.solver.solver);
-    stored.epsilon =
-        options_.solver.solver == planner::SolverKind::kCertified ? options_.solver.gap : options_.solver.epsilon;
-    stored.expected_cost = result.expected_cost;
-    stored.lower_bound = result.lower_bound;
-    stored.expansions = result.expansions;
-    stored.seed = options_.solver.seed;
-    stored.version = FEELER_VERSION;
-    stored.policy = result.policy;
-    stored.cpu_s = result.cpu_s;
-    stored.wall_s = result.wall_s;
-    database_.Put(stored);
-  }
-
- private:
-  policies::Database& database_;
-  const planner::PreprocessOptions& options_;
-};
 
 /// Null where there is no limit: JSON has no infinity.
 nlohmann::json Limit(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
@@ -104,7 +69,7 @@ void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
                             const planner::PreprocessOptions& options, const std::string& path) {
   policies::Database database = policies::Database::OpenOrCreate(path, IdentityOf(setup, options));
-  DatabaseSink sink(database, options);
+  policies::DatabaseSink sink(database, options.solver);
   DatabaseBuild build;
   build.summary = planner::Preprocess(setup.task(), setup.map, family, options, sink);
   build.info = database.Info();
@@ -132,17 +97,10 @@ DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Databa
     int hypotheses = 0;
     if (stored && stored->policy) {
       const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored->extents);
-      const planner::PolicyEvaluation evaluation = planner::Evaluate(problem, *stored->policy);
-      error = std::abs(evaluation.expected_cost - stored->expected_cost);
+      const policies::RowVerification row = policies::VerifyRow(*stored, problem);
+      error = std::abs(row.replayed_cost - stored->expected_cost);
       hypotheses = static_cast<int>(problem.hypotheses.size());
-      if (!evaluation.valid()) {
-        faults[i] = planner::ToString(stored->extents) + ": " + evaluation.fault;
-      } else if (!(error <= kCostTolerance)) {
-        faults[i] = planner::ToString(stored->extents) + ": the stored cost " + std::to_string(stored->expected_cost) +
-                    " is not the replayed " + std::to_string(evaluation.expected_cost);
-      } else if (stored->lower_bound > stored->expected_cost + kCostTolerance) {
-        faults[i] = planner::ToString(stored->extents) + ": the lower bound lies above the cost";
-      }
+      if (!row.valid()) faults[i] = planner::ToString(stored->extents) + ": " + row.fault;
     }
     const std::lock_guard lock(mutex);
     if (hypotheses > 0) ++result.policies;

@@ -39,7 +39,4 @@ struct DatabaseVerification {
 DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Database& database, Parallelism jobs,
                                     const ProgressCallback& progress, const CancellationToken* cancellation);
 
-/// The largest error of a stored cost that verification accepts.
-inline constexpr double kCostTolerance = 1e-9;
-
 }  // namespace feeler::workflow
