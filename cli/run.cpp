@@ -113,7 +113,7 @@ void Run(const Flags& flags, Session& session) {
     if (out.is_open()) out << evaluation::ToJson(record).dump() << "\n" << std::flush;
   };
   ProgressBar bar("episodes");
-  workflow::RunEpisodes(flags.episodes, jobs, make_runner, on_record, bar.Callback(), session.cancellation);
+  workflow::RunEpisodes({0, flags.episodes}, jobs, make_runner, on_record, bar.Callback(), session.cancellation);
   bar.Finish();
   if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
 

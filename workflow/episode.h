@@ -48,9 +48,15 @@ class EpisodeRunner {
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 
-/// Runs episodes 0..count-1 on several threads; hands the records to `on_record` in order of episode. Stops early,
-/// after the records finished so far, when cancelled. Returns how many were handed over.
-std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
+/// Episodes first..end-1.
+struct EpisodeRange {
+  std::int64_t first = 0;
+  std::int64_t end = 0;
+};
+
+/// Runs episodes on several threads; hands the records to `on_record` in order of episode. Stops early, after the
+/// records finished so far, when cancelled. Returns how many were handed over. `progress` counts from episode 0.
+std::int64_t RunEpisodes(EpisodeRange range, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
                          const std::function<void(const EpisodeRecord&)>& on_record, const ProgressCallback& progress,
                          const CancellationToken* cancellation);
 

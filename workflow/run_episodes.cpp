@@ -10,14 +10,14 @@
 
 namespace feeler::workflow {
 
-std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
+std::int64_t RunEpisodes(EpisodeRange range, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
                          const std::function<void(const EpisodeRecord&)>& on_record, const ProgressCallback& progress,
                          const CancellationToken* cancellation) {
-  std::atomic<std::int64_t> next{0};
+  std::atomic<std::int64_t> next{range.first};
   std::atomic<bool> stop{false};
   std::mutex mutex;  // guards all below
   std::map<std::int64_t, EpisodeRecord> waiting;
-  std::int64_t handed_over = 0;
+  std::int64_t handed_over = range.first;
   std::exception_ptr error;
 
   const auto work = [&] {
@@ -25,7 +25,7 @@ std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::functi
       EpisodeRunner runner = make_runner();
       while (!stop && !(cancellation != nullptr && cancellation->cancelled())) {
         const std::int64_t episode = next++;
-        if (episode >= count) return;
+        if (episode >= range.end) return;
         EpisodeRecord record = runner.Run(static_cast<std::uint64_t>(episode));
         const std::lock_guard lock(mutex);
         waiting.emplace(episode, std::move(record));
@@ -34,7 +34,7 @@ std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::functi
           waiting.erase(waiting.begin());
           ++handed_over;
         }
-        if (progress) progress(handed_over, count);
+        if (progress) progress(handed_over, range.end);
       }
     } catch (...) {
       const std::lock_guard lock(mutex);
@@ -48,7 +48,7 @@ std::int64_t RunEpisodes(std::int64_t count, Parallelism jobs, const std::functi
   work();
   for (std::thread& thread : threads) thread.join();
   if (error) std::rethrow_exception(error);
-  return handed_over;
+  return handed_over - range.first;
 }
 
 }  // namespace feeler::workflow
