@@ -19,7 +19,7 @@ struct Flags {
   std::string out;
   bool list = false;
   bool quick = false;
-  std::uint64_t seed = 1;
+  std::int64_t seed = 1;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
@@ -46,7 +46,7 @@ void Run(const Flags& flags, Session& session) {
   request.out = flags.out;
   request.quick = flags.quick;
   request.jobs = ParseJobs(flags.jobs);
-  request.seed = flags.seed;
+  request.seed = ParseSeed(flags.seed);
   request.command = fmt::format("feeler experiment {} --out {}{} --seed {} --jobs {}", flags.name, flags.out,
                                 flags.quick ? " --quick" : "", flags.seed, request.jobs.threads());
   request.cancellation = session.cancellation;

@@ -9,6 +9,7 @@
 #include "cli/progress_bar.h"
 #include "cli/solver_flags.h"
 #include "core/error.h"
+#include "policies/formats/problem_family_file.h"
 #include "workflow/database_builder.h"
 
 namespace feeler::cli {
@@ -26,10 +27,16 @@ struct Flags {
   SolverFlags solver;
 };
 
+planner::ProblemFamily FamilyFor(const std::string& text, const Task& task) {
+  if (text.empty()) return planner::FamilyOf(task);
+  if (text.ends_with(".json")) return policies::ReadProblemFamily(text, task);
+  return planner::ParseProblemFamily(text, task);
+}
+
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
   planner::PreprocessOptions options;
   options.solver = flags.solver.Options(command);
-  options.seed = flags.solver.seed;
+  options.seed = options.solver.seed;
   options.jobs = ParseJobs(flags.jobs);
   options.cancellation = session.cancellation;
   if (flags.order == "random") {
@@ -47,8 +54,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   setup_options.progress = map_bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
   map_bar.Finish();
-  const planner::ProblemFamily family =
-      flags.family.empty() ? planner::FamilyOf(setup.task()) : planner::ParseProblemFamily(flags.family);
+  const planner::ProblemFamily family = FamilyFor(flags.family, setup.task());
   workflow::RequireWithinTask(family, setup.task());
 
   ProgressBar bar("problems");
@@ -75,7 +81,8 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("preprocess", "Build (or continue) the policy database of a task");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--out", flags->out, "database file; an existing one is continued")->required();
-  command->add_option("--family", flags->family, "problems, e.g. 2..15x2..15x2..15 (default: the task's ranges)");
+  command->add_option("--family", flags->family,
+                      "problems, e.g. 2..15x2..15x2..15, or a JSON file of them (default: the task's ranges)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--order", flags->order, "uncertainty or random (e-rtdp-bel)")->capture_default_str();
   command->add_option("--experience", flags->experience, "rollout, naive or none (e-rtdp-bel)")->capture_default_str();

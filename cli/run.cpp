@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "cli/commands.h"
@@ -11,11 +12,11 @@
 #include "cli/solver_flags.h"
 #include "core/error.h"
 #include "env/scene.h"
-#include "env/sensing/noise.h"
 #include "evaluation/episode_json.h"
 #include "evaluation/run_summary.h"
 #include "workflow/database_builder.h"
 #include "workflow/episode.h"
+#include "workflow/episode_noise.h"
 #include "workflow/episode_video.h"
 
 namespace feeler::cli {
@@ -33,6 +34,7 @@ struct Flags {
   std::int64_t seed = 1;
   std::int64_t video_episode = 0;
   int jobs = 1;
+  std::optional<double> confirm_limit_m;
   bool no_ladder = false;
   bool withhold_true_pose = false;
   bool json = false;
@@ -44,11 +46,17 @@ std::string Joined(const std::vector<std::string>& names) {
   return joined;
 }
 
+/// The names, and a line about each.
+std::string NoiseHelp() {
+  std::string help = "one of these, or several with commas between:";
+  for (const workflow::NoiseName& noise : workflow::NoiseNames()) help += "\n" + noise.name + ": " + noise.meaning;
+  return help;
+}
+
 void RequireSane(const Flags& flags) {
   if (flags.episodes < 1) {
     throw InputError("--episodes", std::to_string(flags.episodes) + " episodes", "give a number of at least 1");
   }
-  if (flags.seed < 0) throw InputError("--seed", "negative", "give a number of at least 0");
   if (flags.video_episode < 0) throw InputError("--video-episode", "negative", "give a number of at least 0");
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
   if (!flags.video.empty()) RequireWritable("--video", flags.video);
@@ -76,7 +84,7 @@ planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies:
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = ParseJobs(flags.jobs);
-  env::NoisePreset(flags.noise);  // an unknown name fails before the contact map is built
+  workflow::ParseNoise(flags.noise);  // an unknown name fails before the contact map is built
 
   std::shared_ptr<policies::Database> database;
   if (!flags.db.empty()) {
@@ -95,9 +103,11 @@ void Run(const Flags& flags, Session& session) {
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
 
   workflow::EpisodeOptions options;
-  options.seed = static_cast<std::uint64_t>(flags.seed);
+  options.seed = ParseSeed(flags.seed);
   options.family = FamilyFor(flags, setup->task(), database.get());
   options.noise = flags.noise;
+  options.ladder = !flags.no_ladder;
+  options.confirm_limit_m = flags.confirm_limit_m;
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
   const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };
@@ -130,6 +140,7 @@ void Run(const Flags& flags, Session& session) {
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["noise"] = flags.noise;
+    json["ladder"] = !flags.no_ladder;
     json["seed"] = flags.seed;
     PrintJson(json);
   } else {
@@ -154,8 +165,10 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
   command->add_option("--extents", flags->extents,
                       "always this problem, e.g. 7x7x7 (default: drawn from the database)");
-  command->add_option("--noise", flags->noise, Joined(env::NoisePresetNames()))->capture_default_str();
-  command->add_flag("--no-ladder", flags->no_ladder, "the bare policy, without fallbacks");
+  command->add_option("--noise", flags->noise, NoiseHelp())->capture_default_str();
+  command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
+  command->add_option("--confirm-limit", flags->confirm_limit_m,
+                      "touch until the position across the insertion is known this well, m (default: 0.0005)");
   command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
                     "leave the true pose out of what the environment tells; the records stay the same");
   command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();

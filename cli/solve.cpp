@@ -49,8 +49,8 @@ planner::Problem LoadProblem(const Flags& flags) {
   if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
   options.jobs = ParseJobs(flags.jobs);
   options.progress = bar.Callback();
-  const planner::Extents extents = planner::ParseExtents(flags.extents);
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
+  const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
   workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
   return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
 }

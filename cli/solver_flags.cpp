@@ -55,7 +55,7 @@ planner::SolverOptions SolverFlags::Options(const CLI::App& command) const {
                std::array{HeuristicKind::kCertificate, HeuristicKind::kLines, HeuristicKind::kFirstContact});
   }
   options.gap = gap;
-  options.seed = seed;
+  options.seed = ParseSeed(seed);
   // Given limits are passed on as they are, so that 0 and nonsense are rejected rather than taken for "none".
   if (command.count("--time-limit") > 0) options.time_limit_s = time_limit_s;
   if (command.count("--expansion-limit") > 0) options.expansion_limit = expansion_limit;
@@ -75,6 +75,11 @@ planner::ExperienceKind ParseExperience(const std::string& text) {
 
 GoalKind ParseGoal(const std::string& text) {
   return Choose("--goal", text, std::array{GoalKind::kSingleton, GoalKind::kInsertable});
+}
+
+std::uint64_t ParseSeed(std::int64_t seed) {
+  if (seed < 0) throw InputError("--seed", std::to_string(seed) + " is negative", "give a number of at least 0");
+  return static_cast<std::uint64_t>(seed);
 }
 
 Parallelism ParseJobs(int jobs) {

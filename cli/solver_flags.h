@@ -19,7 +19,7 @@ struct SolverFlags {
   double gap = 1.2;
   double time_limit_s = 0.0;  ///< 0: not given
   std::int64_t expansion_limit = 0;
-  std::uint64_t seed = 1;
+  std::int64_t seed = 1;
 
   void AddTo(CLI::App& command);
   /// Throws InputError naming the option that is out of range.
@@ -32,6 +32,8 @@ env::Opening ParseOpening(const std::string& text);
 planner::ExperienceKind ParseExperience(const std::string& text);
 /// --goal singleton|insertable.
 GoalKind ParseGoal(const std::string& text);
+/// --seed, at least 0.
+std::uint64_t ParseSeed(std::int64_t seed);
 /// --jobs, 1..1024.
 Parallelism ParseJobs(int jobs);
 

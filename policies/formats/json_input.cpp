@@ -130,7 +130,7 @@ void JsonField::Fail(const std::string& what, const std::string& mend) const {
 
 void JsonField::RequireKeys(std::initializer_list<std::string_view> required,
                             std::initializer_list<std::string_view> optional) const {
-  if (!value_.is_object()) Fail("is " + Shown() + ", not an object");
+  if (!value_.is_object()) Fail("is " + Shown() + ", not an object", "write {...}");
   for (const std::string_view key : required) {
     if (!value_.contains(key)) Fail(fmt::format("\"{}\" is missing", key), "add it");
   }
@@ -144,38 +144,41 @@ void JsonField::RequireKeys(std::initializer_list<std::string_view> required,
 }
 
 std::size_t JsonField::ListSize(std::size_t min, std::size_t max) const {
-  if (!value_.is_array()) Fail("is " + Shown() + ", not a list");
+  if (!value_.is_array()) Fail("is " + Shown() + ", not a list", "write [...]");
   const std::size_t size = value_.size();
   if (size >= min && size <= max) return size;
-  if (min == max) Fail(fmt::format("has {} elements, not {}", size, min));
-  Fail(size < min ? fmt::format("has {} elements, needs at least {}", size, min)
-                  : fmt::format("has {} elements, more than {}", size, max));
+  if (min == max) Fail(fmt::format("has {} elements, not {}", size, min), fmt::format("give exactly {}", min));
+  if (size < min) Fail(fmt::format("has {} elements, needs at least {}", size, min), "add what is missing");
+  Fail(fmt::format("has {} elements, more than {}", size, max), "give fewer");
 }
 
 int JsonField::Integer(int min, int max) const {
-  if (!value_.is_number_integer()) Fail("is " + Shown() + ", not a whole number");
+  if (!value_.is_number_integer())
+    Fail("is " + Shown() + ", not a whole number", fmt::format("give one in {}..{}", min, max));
   // Unsigned values beyond the signed range must not wrap around.
   const bool huge = value_.is_number_unsigned() && value_.get<std::uint64_t>() > std::uint64_t{1} << 62;
   if (huge || value_.get<std::int64_t>() < min || value_.get<std::int64_t>() > max) {
-    Fail(fmt::format("is {}, not in {}..{}", Shown(), min, max));
+    Fail(fmt::format("is {}, not in {}..{}", Shown(), min, max), "give a whole number in that range");
   }
   return value_.get<int>();
 }
 
 double JsonField::Number(double min) const {
-  if (!value_.is_number()) Fail("is " + Shown() + ", not a number");
+  if (!value_.is_number()) Fail("is " + Shown() + ", not a number", fmt::format("give a finite number >= {}", min));
   const double number = value_.get<double>();
-  if (!std::isfinite(number) || number < min) Fail(fmt::format("is {}, not a finite number >= {}", Shown(), min));
+  if (!std::isfinite(number) || number < min) {
+    Fail("is " + Shown() + ", out of range", fmt::format("give a finite number >= {}", min));
+  }
   return number;
 }
 
 bool JsonField::Boolean() const {
-  if (!value_.is_boolean()) Fail("is " + Shown() + ", not true or false");
+  if (!value_.is_boolean()) Fail("is " + Shown() + ", not true or false", "write true or false");
   return value_.get<bool>();
 }
 
 std::string JsonField::Text() const {
-  if (!value_.is_string()) Fail("is " + Shown() + ", not a text");
+  if (!value_.is_string()) Fail("is " + Shown() + ", not a text", "put it in quotes");
   return value_.get<std::string>();
 }
 

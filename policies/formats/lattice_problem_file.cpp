@@ -89,7 +89,8 @@ void CheckStart(const LatticeProblemData& data, const JsonField& document) {
   for (int axis = 0; axis < 3; ++axis) {
     if (data.start[axis] < data.size[axis]) continue;
     start[static_cast<std::size_t>(axis)].Fail(
-        fmt::format("is {}, outside the workspace of {} cells", data.start[axis], data.size[axis]));
+        fmt::format("is {}, outside the workspace of {} cells", data.start[axis], data.size[axis]),
+        "give a cell inside, from 0 to size - 1");
   }
   if (data.tool.size() > kMaxStartChecks / data.hypotheses.size()) return;
   std::vector<Key> target;
@@ -158,7 +159,8 @@ LatticeProblemData ParseLatticeProblem(std::string_view text, const std::string&
   if (document.Has("goal")) {
     const JsonField goal = document["goal"];
     const std::string kind = goal.Text();
-    if (kind != "singleton" && kind != "insertable") goal.Fail("is neither \"singleton\" nor \"insertable\"");
+    if (kind != "singleton" && kind != "insertable")
+      goal.Fail("is neither \"singleton\" nor \"insertable\"", "choose one of them");
     data.goal = kind == "singleton" ? GoalKind::kSingleton : GoalKind::kInsertable;
   }
   if (document.Has("insertable_spread")) {

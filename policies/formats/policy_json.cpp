@@ -44,7 +44,7 @@ PolicyFileNode ReadNode(const JsonField& field, int node_count, int hypothesis_c
   const JsonField move = field["move"];
   move.RequireKeys({"direction", "cells"});
   const auto direction = ParseDirection(move["direction"].Text());
-  if (!direction) move["direction"].Fail("is not one of +x -x +y -y +z -z");
+  if (!direction) move["direction"].Fail("is not one of +x -x +y -y +z -z", "choose one of them");
   node.move = {*direction, move["cells"].Integer(1, kMaxMoveCells)};
   const JsonField outcomes = field["outcomes"];
   const std::size_t count = outcomes.ListSize(1, static_cast<std::size_t>(node.move.cells) + 1);
@@ -58,7 +58,7 @@ PolicyFileNode ReadNode(const JsonField& field, int node_count, int hypothesis_c
     if (branch.outcome.contact != (branch.outcome.cells < node.move.cells)) {
       item["contact"].Fail("contradicts the distance", "contact is true exactly when fewer cells were travelled");
     }
-    if (!seen.insert(branch.outcome.cells).second) item["cells"].Fail("is an outcome listed already");
+    if (!seen.insert(branch.outcome.cells).second) item["cells"].Fail("is an outcome listed already", "remove one");
     node.outcomes.push_back(branch);
   }
   return node;
@@ -74,7 +74,7 @@ void CheckPaths(const PolicyFile& file, const JsonField& nodes) {
     }
   }
   const auto order = ChildrenFirst(graph);
-  if (!order) nodes.Fail("has a cycle");
+  if (!order) nodes.Fail("has a cycle", "let every branch end in a leaf");
   std::vector<int> paths(file.nodes.size(), 0);
   paths[static_cast<std::size_t>(file.root)] = 1;
   std::vector<int> leaf_of(file.hypotheses.size(), -1);
@@ -88,12 +88,15 @@ void CheckPaths(const PolicyFile& file, const JsonField& nodes) {
     if (node.is_leaf() && paths[*it] > 1) nodes[*it].Fail("is a leaf reached on two paths", "give each path its leaf");
     for (const int hypothesis : node.hypotheses) {
       int& leaf = leaf_of[static_cast<std::size_t>(hypothesis)];
-      if (leaf >= 0) nodes[*it].Fail(fmt::format("lists hypothesis {}, which ends in node {} too", hypothesis, leaf));
+      if (leaf >= 0)
+        nodes[*it].Fail(fmt::format("lists hypothesis {}, which ends in node {} too", hypothesis, leaf),
+                        "list each once");
       leaf = static_cast<int>(*it);
     }
   }
   const auto lost = std::find(leaf_of.begin(), leaf_of.end(), -1);
-  if (lost != leaf_of.end()) nodes.Fail(fmt::format("has no leaf for hypothesis {}", lost - leaf_of.begin()));
+  if (lost != leaf_of.end())
+    nodes.Fail(fmt::format("has no leaf for hypothesis {}", lost - leaf_of.begin()), "add it to a leaf");
 }
 
 }  // namespace
@@ -218,7 +221,8 @@ PolicyFile ParsePolicyFile(std::string_view text, const std::string& where) {
     const Cell offset(number(0), number(1), number(2));
     const int orientation = length == 4 ? item[3].Integer(0, kMaxCoordinate) : 0;
     oriented |= length == 4;
-    if (!seen.emplace(offset.x(), offset.y(), offset.z(), orientation).second) item.Fail("is listed already");
+    if (!seen.emplace(offset.x(), offset.y(), offset.z(), orientation).second)
+      item.Fail("is listed already", "remove one");
     file.hypotheses.push_back(offset);
     file.orientations.push_back(orientation);
   }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/run_feeler.h"
 
@@ -18,6 +20,7 @@ void ExpectOneError(const CommandResult& result, const std::string& named) {
   EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
+  EXPECT_TRUE(result.err.ends_with(")\n")) << "says not how to mend it: " << result.err;
 }
 
 TEST(BadUsage, UnknownWordsAndValuesAreNamed) {
@@ -38,6 +41,51 @@ TEST(BadUsage, UnknownWordsAndValuesAreNamed) {
   ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--time-limit", "0"}), "time");
   ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--expansion-limit", "-1"}), "expansion");
   ExpectOneError(RunFeeler({"solve", "--problem", "/no/such/file.json"}), "/no/such/file.json");
+  ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--seed", "-1"}), "--seed");
+}
+
+TEST(BadProblemFile, EveryFaultIsNamedWithItsPlaceAndItsMend) {
+  const std::string file = ScratchFolder("problem") + "/problem.json";
+  const nlohmann::json sound = {
+      {"name", "sound"},           {"size", {6, 6, 1}},
+      {"start", {0, 0, 0}},        {"tool", {{0, 0, 0}}},
+      {"target", {{4, 4, 0}}},     {"hypotheses", {{0, 0, 0, 1}, {1, 0, 0, 2.5}}},
+      {"move_lengths", {1, 2, 4}}, {"cost", {{"per_cell", 1}, {"per_contact", 0}, {"per_action", 0}}}};
+  const auto expect = [&](const std::string& text, const std::string& named) {
+    std::ofstream(file) << text;
+    ExpectOneError(RunFeeler({"solve", "--problem", file, "--json"}), named);
+  };
+  std::ofstream(file) << sound.dump();
+  EXPECT_EQ(RunFeeler({"solve", "--problem", file, "--json"}).exit_code, 0);
+  const auto expect_with = [&](const char* pointer, const nlohmann::json& value, const std::string& named) {
+    nlohmann::json bad = sound;
+    bad[nlohmann::json::json_pointer(pointer)] = value;
+    expect(bad.dump(), named);
+  };
+  expect_with("/size/0", -3, "size[0]");
+  expect_with("/size/1", 2.5, "size[1]");
+  expect_with("/size", {1000, 1000, 1000}, "size");
+  expect_with("/size", {6, 6}, "size");
+  expect_with("/start", {4, 4, 0}, "hypotheses[0]");
+  expect_with("/start", {6, 0, 0}, "start[0]");
+  expect_with("/hypotheses", nlohmann::json::array(), "hypotheses");
+  expect_with("/hypotheses/1", {0, 0, 0, 1}, "hypotheses[1]");
+  expect_with("/hypotheses/1", {1, 0, 0}, "hypotheses[1]");
+  expect_with("/hypotheses/0/3", 0, "hypotheses[0][3]");
+  expect_with("/hypotheses/0/3", -1, "hypotheses[0][3]");
+  expect_with("/hypotheses/0/3", nullptr, "hypotheses[0][3]");
+  expect_with("/hypotheses/0/3", "nan", "hypotheses[0][3]");
+  expect_with("/move_lengths", {2, 1}, "move_lengths[1]");
+  expect_with("/move_lengths", {0}, "move_lengths[0]");
+  expect_with("/cost/per_cell", -1, "cost.per_cell");
+  expect_with("/cost/per_cell", 0, "cost");
+  expect_with("/colour", "red", "colour");
+  expect_with("/goal", "nirvana", "goal");
+  nlohmann::json incomplete = sound;
+  incomplete.erase("target");
+  expect(incomplete.dump(), "target");
+  expect(sound.dump().substr(0, 60), "JSON");
+  expect("", "JSON");
 }
 
 TEST(BadUsage, PreprocessRefusesBadFamiliesAndPlaces) {
