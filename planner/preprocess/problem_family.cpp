@@ -41,6 +41,33 @@ bool ParseRange(std::string_view text, std::pair<int, int>& range) {
          range.first <= range.second;
 }
 
+/// The axes that the parts of a text stand for: x, y and z if there are three, else the uncertain position axes of the
+/// task if there are as many. Empty: neither.
+std::vector<std::size_t> AxesOf(std::size_t parts, const Task* task) {
+  if (parts == 3) return {0, 1, 2};
+  std::vector<std::size_t> axes;
+  if (task == nullptr) return axes;
+  for (const UncertainAxis& axis : task->axes) {
+    if (!axis.angular()) axes.push_back(static_cast<std::size_t>(axis.kind));
+  }
+  return axes.size() == parts ? axes : std::vector<std::size_t>();
+}
+
+/// "x, y" of a task with these axes.
+std::string AxisNames(const Task& task) {
+  std::string names;
+  for (const UncertainAxis& axis : task.axes) {
+    if (!axis.angular()) names += (names.empty() ? "" : ", ") + std::string(ToString(axis.kind));
+  }
+  return names;
+}
+
+std::string OrForTask(const Task* task) {
+  if (task == nullptr) return "";
+  const std::string names = AxisNames(*task);
+  return names.empty() || names == "x, y, z" ? "" : fmt::format(", or for the axes {} of {} only", names, task->name);
+}
+
 ProblemFamily Enumerate(const std::array<std::pair<int, int>, 3>& ranges, std::string spec) {
   ProblemFamily family;
   family.spec = std::move(spec);
@@ -52,20 +79,40 @@ ProblemFamily Enumerate(const std::array<std::pair<int, int>, 3>& ranges, std::s
   return family;
 }
 
+Extents ParseExtentsFor(std::string_view text, const Task* task) {
+  const std::vector<std::string_view> parts = Split(text, 'x');
+  const std::vector<std::size_t> axes = AxesOf(parts.size(), task);
+  std::array<int, 3> counts = {1, 1, 1};
+  bool good = !axes.empty();
+  for (std::size_t i = 0; good && i < axes.size(); ++i) good = ParseCount(parts[i], counts[axes[i]]);
+  if (!good) {
+    throw InputError(fmt::format("extents '{}'", text), "not three counts",
+                     fmt::format("write them as 7x7x5, each from 1 to {}{}", kMostPerAxis, OrForTask(task)));
+  }
+  return {counts[0], counts[1], counts[2]};
+}
+
+ProblemFamily ParseFamilyFor(std::string_view spec, const Task* task) {
+  const std::vector<std::string_view> parts = Split(spec, 'x');
+  const std::vector<std::size_t> axes = AxesOf(parts.size(), task);
+  std::array<std::pair<int, int>, 3> ranges = {{{1, 1}, {1, 1}, {1, 1}}};
+  bool good = !axes.empty();
+  for (std::size_t i = 0; good && i < axes.size(); ++i) good = ParseRange(parts[i], ranges[axes[i]]);
+  if (!good) {
+    throw InputError(
+        fmt::format("family '{}'", spec), "not three ranges of counts",
+        fmt::format("write it as 2..15x2..15x2..15 or 7x7x5, counts from 1 to {}{}", kMostPerAxis, OrForTask(task)));
+  }
+  return Enumerate(ranges, std::string(spec));
+}
+
 }  // namespace
 
 std::string ToString(const Extents& extents) { return fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz); }
 
-Extents ParseExtents(std::string_view text) {
-  const std::vector<std::string_view> parts = Split(text, 'x');
-  Extents extents;
-  if (parts.size() != 3 || !ParseCount(parts[0], extents.nx) || !ParseCount(parts[1], extents.ny) ||
-      !ParseCount(parts[2], extents.nz)) {
-    throw InputError(fmt::format("extents '{}'", text), "not three counts",
-                     fmt::format("write them as 7x7x5, each from 1 to {}", kMostPerAxis));
-  }
-  return extents;
-}
+Extents ParseExtents(std::string_view text) { return ParseExtentsFor(text, nullptr); }
+
+Extents ParseExtents(std::string_view text, const Task& task) { return ParseExtentsFor(text, &task); }
 
 Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> map, const Extents& extents) {
   Problem problem;
@@ -101,16 +148,20 @@ Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> ma
   return problem;
 }
 
-ProblemFamily ParseProblemFamily(std::string_view spec) {
-  const std::vector<std::string_view> parts = Split(spec, 'x');
-  std::array<std::pair<int, int>, 3> ranges;
-  bool good = parts.size() == 3;
-  for (std::size_t axis = 0; good && axis < 3; ++axis) good = ParseRange(parts[axis], ranges[axis]);
-  if (!good) {
-    throw InputError(fmt::format("family '{}'", spec), "not three ranges of counts",
-                     fmt::format("write it as 2..15x2..15x2..15 or 7x7x5, counts from 1 to {}", kMostPerAxis));
+ProblemFamily ParseProblemFamily(std::string_view spec) { return ParseFamilyFor(spec, nullptr); }
+
+ProblemFamily ParseProblemFamily(std::string_view spec, const Task& task) { return ParseFamilyFor(spec, &task); }
+
+ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string spec) {
+  ProblemFamily all;
+  all.spec = std::move(spec);
+  for (const ProblemFamily& family : families) {
+    all.problems.insert(all.problems.end(), family.problems.begin(), family.problems.end());
   }
-  return Enumerate(ranges, std::string(spec));
+  std::ranges::sort(all.problems);
+  const auto repeated = std::ranges::unique(all.problems);
+  all.problems.erase(repeated.begin(), repeated.end());
+  return all;
 }
 
 ProblemFamily FamilyOf(const Task& task) {

@@ -24,6 +24,9 @@ struct Extents {
 std::string ToString(const Extents& extents);
 /// Parses "7x7x5". Throws InputError if it is not three positive counts of at most 64.
 Extents ParseExtents(std::string_view text);
+/// The same for a task: beside three counts, one per uncertain position axis of the task, in its order ("7x7" of a task
+/// with the axes x and y is 7x7x1).
+Extents ParseExtents(std::string_view text, const Task& task);
 
 /// The problem of a cuboid of hypotheses: offsets {0..n-1} per axis, lexicographic (x slowest, z fastest, orientation
 /// of the map fastest of all), the estimate at the cuboid's centre. Start cell per axis: floor((n-1)/2 +
@@ -38,6 +41,10 @@ struct ProblemFamily {
 
 /// Parses "2..15x2..15x2..15" (ranges or single counts per axis). Throws InputError on nonsense.
 ProblemFamily ParseProblemFamily(std::string_view spec);
+/// The same for a task: ranges or counts of x, y and z, or one per uncertain position axis of the task, in its order.
+ProblemFamily ParseProblemFamily(std::string_view spec, const Task& task);
+/// The problems of all the families, each once, in lexicographic order. `spec` is kept as it is.
+ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string spec);
 /// The family the task file gives by the ranges of its axes (an axis that is not uncertain has extent 1).
 ProblemFamily FamilyOf(const Task& task);
 
