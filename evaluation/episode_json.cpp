@@ -19,6 +19,7 @@ nlohmann::ordered_json MoveJson(const execution::MoveRecord& move) {
   json["travelled_m"] = move.travelled_m;
   json["contact"] = move.contact;
   json["peak_force_n"] = move.peak_force_n;
+  json["duration_s"] = move.duration_s;
   return json;
 }
 

@@ -20,6 +20,7 @@ struct MoveRecord {
   double travelled_m = 0.0;
   bool contact = false;
   double peak_force_n = 0.0;
+  double duration_s = 0.0;  ///< on the clock of the robot, what came before it since the last motion included
 };
 
 /// One rung of the fallback ladder that was used.

@@ -24,7 +24,12 @@ std::optional<Direction> DirectionOf(const Eigen::Vector3d& motion) {
 }
 
 Mover::Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record)
-    : robot_(robot), frame_(frame), options_(options), record_(record), start_time_s_(robot.Time()) {
+    : robot_(robot),
+      frame_(frame),
+      options_(options),
+      record_(record),
+      start_time_s_(robot.Time()),
+      last_motion_end_s_(start_time_s_) {
   position_ = Measure(robot.ToolPose());
 }
 
@@ -70,6 +75,9 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   move.travelled_m = travelled * frame_.cell_m;
   move.contact = report.contact;
   move.peak_force_n = std::isfinite(result.peak_force_n) ? result.peak_force_n : 0.0;
+  const double now_s = robot_.Time();
+  move.duration_s = now_s - last_motion_end_s_;
+  last_motion_end_s_ = now_s;
   record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
   record_.path_length_m += (report.end - before).norm() * frame_.cell_m;
   record_.moves.push_back(std::move(move));

@@ -64,6 +64,7 @@ class Mover {
   const ExecutorOptions& options_;
   ExecutionRecord& record_;
   double start_time_s_;
+  double last_motion_end_s_;
   Eigen::Vector3d position_;
 };
 

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "env/oversize_target.h"
 #include "workflow/cpu_clock.h"
+#include "workflow/fall_in_draw.h"
 
 namespace feeler::workflow {
 namespace {
@@ -29,18 +31,33 @@ std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) 
 
 EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
                              PolicyFactory policy_factory, EpisodeOptions options)
-    : setup_(std::move(setup)), policy_factory_(std::move(policy_factory)), options_(std::move(options)) {
+    : setup_(std::move(setup)),
+      policy_factory_(std::move(policy_factory)),
+      options_(std::move(options)),
+      noise_(ParseNoise(options_.noise)) {
+  if (noise_.oversize_m > 0.0) {
+    scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
+  }
   environment_ = std::make_unique<env::InsertionEnv>(std::move(scene));
 }
 
 EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   const Task& task = setup_->task();
   const double cpu_start_s = ThreadCpuSeconds();
-  const EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode);
+  EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode, noise_);
+  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
+  const double plan_start_s = ThreadCpuSeconds();
+  const std::unique_ptr<policies::Policy> policy = policy_factory_(problem, draw.extents);
+  const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
+  if (noise_.fall_in) {
+    RandomStream random(options_.seed, episode, "truth that falls in");
+    const auto truth = DrawFallIn(task, problem, *policy, draw.world_T_estimate, random);
+    if (truth) draw.world_T_true = TurnedByNoise(task, noise_, options_.seed, episode, *truth);
+  }
 
   EpisodeRecord record;
   record.task = task.name;
-  record.noise = options_.noise;
+  record.noise = noise_.name;
   record.seed = options_.seed;
   record.episode = episode;
   record.extents = draw.extents;
@@ -52,15 +69,11 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   reset.world_T_estimate = draw.world_T_estimate;
   reset.world_T_target = draw.world_T_true;
   reset.extents = AxisExtents(task, draw.extents);
-  reset.noise = env::NoisePreset(options_.noise);
+  reset.noise = noise_.robot;
   reset.start = env::StartPlace::kHome;
   reset.withhold_true_pose = options_.withhold_true_pose;
   environment_->Reset(options_.seed, reset);
 
-  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
-  const double plan_start_s = ThreadCpuSeconds();
-  const std::unique_ptr<policies::Policy> policy = policy_factory_(problem, draw.extents);
-  const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
   record.policy = policy->name();
 
   const double transfer_start_s = ThreadCpuSeconds();
@@ -74,6 +87,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options = execution::ExecutorOptions::WithFriction();
       options.contact_force_n = reset.noise.contact_threshold_n;
     }
+    if (options_.confirm_limit_m) options.confirm_limit_m = *options_.confirm_limit_m;
     record.execution =
         execution::Execute(task, problem, draw.world_T_estimate, *policy, environment_->robot(), options);
   } else {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "execution/executor.h"
 #include "planner/preprocess/problem_family.h"
 #include "workflow/episode_draw.h"
+#include "workflow/episode_noise.h"
 #include "workflow/episode_record.h"
 #include "workflow/planning_setup.h"
 #include "workflow/policy_registry.h"
@@ -22,7 +24,10 @@ struct EpisodeOptions {
   std::uint64_t seed = 1;
   /// The problems an episode may meet, drawn uniformly; one problem: always that one.
   planner::ProblemFamily family;
-  std::string noise = "ideal";
+  std::string noise = "ideal";  ///< names of NoiseNames(), with commas between
+  bool ladder = true;           ///< fallbacks when the policy does not come to an insertion
+  /// How well the position across the insertion must be known before the insertion; default: the executor's.
+  std::optional<double> confirm_limit_m;
   /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
   bool withhold_true_pose = false;
 };
@@ -45,6 +50,7 @@ class EpisodeRunner {
   std::shared_ptr<const PlanningSetup> setup_;
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
+  EpisodeNoise noise_;
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 

@@ -6,6 +6,7 @@
 #include "core/pose.h"
 #include "core/task.h"
 #include "planner/preprocess/problem_family.h"
+#include "workflow/episode_noise.h"
 
 namespace feeler::workflow {
 
@@ -20,8 +21,13 @@ struct EpisodeDraw {
 std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid);
 
 /// Episode k of a seed, the same alone or among thousands: a problem uniform in the family, and a true offset uniform
-/// in the lattice span plus half a cell each side along every uncertain axis. Throws InputError for an empty family.
+/// in the lattice span plus half a cell each side along every uncertain axis. `noise` then moves the truth outside of
+/// that box, or turns it; its other parts are not drawn here. Throws InputError for an empty family.
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
-                        std::uint64_t episode);
+                        std::uint64_t episode, const EpisodeNoise& noise = {});
+
+/// The pose turned by the noise's yaw error about the insertion axis, with the sign of the episode.
+Pose TurnedByNoise(const Task& task, const EpisodeNoise& noise, std::uint64_t seed, std::uint64_t episode,
+                   const Pose& world_T_target);
 
 }  // namespace feeler::workflow

@@ -1,0 +1,97 @@
+#include "workflow/episode_noise.h"
+
+#include <algorithm>
+#include <functional>
+#include <numbers>
+
+#include "core/error.h"
+
+namespace feeler::workflow {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// What a name adds to the world; the arm's presets stand in env.
+struct WorldNoise {
+  const char* name;
+  const char* meaning;
+  void (*add)(EpisodeNoise& noise);
+};
+
+void AddYaw(EpisodeNoise& noise, double degrees) {
+  if (noise.yaw_error_rad > 0.0) throw InputError("noise", "two yaw errors", "give one of them");
+  noise.yaw_error_rad = degrees * kDegree;
+}
+
+constexpr WorldNoise kWorldNoises[] = {
+    {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
+     [](EpisodeNoise& n) { n.outside = true; }},
+    {"fall-in", "the target stands where a probe of the policy falls into the opening",
+     [](EpisodeNoise& n) { n.fall_in = true; }},
+    {"oversize", "the sides of the target stand 0.5 mm farther out than in the model",
+     [](EpisodeNoise& n) { n.oversize_m = 0.0005; }},
+    {"yaw-1", "the target is turned by 1 degree, either way", [](EpisodeNoise& n) { AddYaw(n, 1.0); }},
+    {"yaw-2", "the target is turned by 2 degrees", [](EpisodeNoise& n) { AddYaw(n, 2.0); }},
+    {"yaw-3", "the target is turned by 3 degrees", [](EpisodeNoise& n) { AddYaw(n, 3.0); }},
+};
+
+const char* MeaningOfArmNoise(const std::string& name) {
+  if (name == "ideal") return "nothing";
+  if (name == "friction") return "3 Nm of friction in the large joints, 1.2 Nm in the wrists, force noise of 1 N";
+  return "arm and force sensor";
+}
+
+std::vector<std::string> Split(std::string_view text) {
+  std::vector<std::string> names;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', from), text.size());
+    names.emplace_back(text.substr(from, comma - from));
+    from = comma + 1;
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<NoiseName> NoiseNames() {
+  std::vector<NoiseName> names;
+  for (const std::string& name : env::NoisePresetNames()) names.push_back({name, MeaningOfArmNoise(name)});
+  for (const WorldNoise& world : kWorldNoises) names.push_back({world.name, world.meaning});
+  return names;
+}
+
+EpisodeNoise ParseNoise(std::string_view text) {
+  EpisodeNoise noise;
+  noise.robot = env::NoisePreset("ideal");
+  bool arm_given = false;
+  std::vector<std::string> seen;
+  for (const std::string& name : Split(text)) {
+    if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
+      throw InputError("noise", "'" + name + "' stands twice", "give it once");
+    }
+    seen.push_back(name);
+    const auto* world = std::find_if(std::begin(kWorldNoises), std::end(kWorldNoises),
+                                     [&](const WorldNoise& candidate) { return name == candidate.name; });
+    if (world != std::end(kWorldNoises)) {
+      world->add(noise);
+      continue;
+    }
+    const std::vector<std::string> arm = env::NoisePresetNames();
+    if (std::find(arm.begin(), arm.end(), name) == arm.end()) {
+      std::string known;
+      for (const NoiseName& n : NoiseNames()) known += (known.empty() ? "" : ", ") + n.name;
+      throw InputError("noise", "no noise is named '" + name + "'", "one of, or several with commas: " + known);
+    }
+    if (name == "ideal") continue;
+    if (arm_given) throw InputError("noise", "two noises of the arm", "give one of them");
+    arm_given = true;
+    noise.robot = env::NoisePreset(name);
+  }
+  if (noise.outside && noise.fall_in) {
+    throw InputError("noise", "'outside' and 'fall-in' both say where the target stands", "give one of them");
+  }
+  noise.name = text;
+  return noise;
+}
+
+}  // namespace feeler::workflow
