@@ -79,7 +79,7 @@ void ExperienceHeuristicPass(benchmark::State& state) {
     BeliefGraph graph(problem, ThePlug().paper->masks(), false);
     const auto heuristic = ThePlug().paper->MakeHeuristic(problem, graph.sets());
     graph.SetHeuristic(heuristic.get());
-    const ExperienceHeuristic experience(graph, RollOut(graph, *solved.policy), 2.0);
+    const ExperienceHeuristic experience(graph, RollOut(graph, *solved.policy), 2.0, JumpKind::kSameHypotheses);
     state.counters["beliefs"] = static_cast<double>(experience.values().size());
     state.counters["sweeps"] = experience.sweeps();
   }

@@ -24,7 +24,7 @@ nlohmann::json Limit(double value) { return std::isfinite(value) ? nlohmann::jso
 }  // namespace
 
 policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
-  const planner::SolverOptions& solver = options.solver;
+  const planner::SolverOptions solver = planner::WithFamilyBudget(options.solver);  // what is used
   nlohmann::json settings = {
       {"solver", planner::ToString(solver.solver)},
       {"heuristic", planner::ToString(solver.heuristic)},

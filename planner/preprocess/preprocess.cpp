@@ -30,16 +30,12 @@ class Framework {
         family_(family),
         options_(options),
         sink_(sink),
-        solver_(options.solver),
+        solver_(WithFamilyBudget(options.solver)),
         order_(OrderOf(family, options.order, options.seed)),
         states_(order_.size()) {
     solver_.on_bounds = nullptr;
     solver_.cancellation = options.cancellation;
     Validate(solver_);
-    if (solver_.solver == SolverKind::kCertified && std::isinf(solver_.time_limit_s) &&
-        solver_.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
-      solver_.expansion_limit = kDefaultExpansionLimit;
-    }
     needs_experience_ = solver_.solver == SolverKind::kERtdpBel && options.experience != ExperienceKind::kNone;
   }
 
@@ -189,6 +185,14 @@ class Framework {
 };
 
 }  // namespace
+
+SolverOptions WithFamilyBudget(SolverOptions solver) {
+  if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
+      solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
+    solver.expansion_limit = kDefaultExpansionLimit;
+  }
+  return solver;
+}
 
 PreprocessSummary Preprocess(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
                              const PreprocessOptions& options, PolicySink& sink) {

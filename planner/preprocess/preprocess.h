@@ -24,9 +24,12 @@ class PolicySink {
   virtual void Store(const Extents& extents, const Problem& problem, const SolverResult& result) = 0;
 };
 
+/// The options that each problem of a family is solved with: the certified solver without any limit is given 20,000
+/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family.
+SolverOptions WithFamilyBudget(SolverOptions solver);
+
 struct PreprocessOptions {
-  /// Cancellation and on_bounds of it are ignored. The certified solver without a time or expansion limit is given
-  /// 20,000 expansions a problem, so that one problem whose gap cannot be closed never holds up the family.
+  /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them.
   SolverOptions solver;
   ProblemOrder order = ProblemOrder::kUncertainty;
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <iterator>
 #include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "planner/solver/expand_policy.h"
@@ -12,39 +14,37 @@
 namespace feeler::planner {
 namespace {
 
-/// Collects beliefs and transitions; each belief keeps the first transition it is given.
+/// Collects beliefs and transitions.
 class Builder {
  public:
   explicit Builder(BeliefGraph& graph) : graph_(graph) {}
 
   std::size_t Entry(BeliefId b) {
     const auto [at, added] = index_.try_emplace(b, mdp_.entries.size());
-    if (added) mdp_.entries.push_back({b, false, 0.0, {}});
+    if (added) mdp_.entries.push_back({b, {}});
     return at->second;
   }
 
-  /// Adds the transition if it is an action of the belief: applicable, and not without effect. Returns its outcomes.
-  std::vector<BeliefOutcome> AddTransition(BeliefId b, const GuardedMove& move) {
-    if (!graph_.problem().workspace.Contains(graph_.robot(b) + move.cells * UnitCell(move.direction))) return {};
-    std::vector<BeliefOutcome> outcomes = graph_.Outcomes(b, move);
-    if (outcomes.size() == 1 && outcomes.front().next == b) return {};
-    const std::size_t entry = Entry(b);
-    double cost = 0.0;
-    std::vector<std::pair<std::size_t, double>> branches;
-    for (const BeliefOutcome& outcome : outcomes) {
-      const double probability = outcome.weight / graph_.Weight(b);
-      cost += probability * graph_.problem().cost.Of(outcome.outcome);
-      if (outcome.next != kNoBelief) branches.emplace_back(Entry(outcome.next), probability);
-    }
-    mdp_.entries[entry].has_action = true;
-    mdp_.entries[entry].cost = cost;
-    mdp_.entries[entry].branches = std::move(branches);
-    return outcomes;
+  bool Applicable(BeliefId b, const GuardedMove& move) const {
+    return graph_.problem().workspace.Contains(graph_.robot(b) + move.cells * UnitCell(move.direction));
   }
 
-  bool HasAction(BeliefId b) const {
-    const auto at = index_.find(b);
-    return at != index_.end() && mdp_.entries[at->second].has_action;
+  /// Adds the transition if it is an action of the belief, that is not without effect. Returns its outcomes. The move
+  /// must be applicable.
+  std::vector<BeliefOutcome> AddTransition(BeliefId b, const GuardedMove& move) {
+    std::vector<BeliefOutcome> outcomes = graph_.Outcomes(b, move);
+    const std::size_t entry = Entry(b);
+    if (outcomes.size() == 1 && outcomes.front().next == b) return outcomes;
+    const auto& known = mdp_.entries[entry].transitions;
+    if (std::ranges::find(known, move, &ExperienceMdp::Transition::move) != known.end()) return outcomes;
+    ExperienceMdp::Transition transition{move, 0.0, {}};
+    for (const BeliefOutcome& outcome : outcomes) {
+      const double probability = outcome.weight / graph_.Weight(b);
+      transition.cost += probability * graph_.problem().cost.Of(outcome.outcome);
+      if (outcome.next != kNoBelief) transition.branches.emplace_back(Entry(outcome.next), probability);
+    }
+    mdp_.entries[entry].transitions.push_back(std::move(transition));
+    return outcomes;
   }
 
   ExperienceMdp Take() { return std::move(mdp_); }
@@ -61,15 +61,17 @@ double NormalisedHeuristic(const BeliefGraph& graph, BeliefId b) { return graph.
 
 ExperienceMdp RollOut(BeliefGraph& graph, const Policy& policy) {
   Builder builder(graph);
-  std::deque<std::pair<std::uint32_t, BeliefId>> open;
+  using History = std::pair<std::uint32_t, BeliefId>;  // as far as it matters: where the policy is, and what it led to
+  std::deque<History> open;
+  std::set<History> seen;
   if (const BeliefId start = graph.Start(); start != kNoBelief) open.emplace_back(policy.root, start);
   while (!open.empty()) {
     const auto [index, b] = open.front();
     open.pop_front();
-    if (builder.HasAction(b)) continue;
+    if (!seen.emplace(index, b).second) continue;
     builder.Entry(b);
     const PolicyNode& node = policy.nodes[index];
-    if (node.is_leaf()) continue;
+    if (node.is_leaf() || !builder.Applicable(b, node.move)) continue;
     for (const BeliefOutcome& outcome : builder.AddTransition(b, node.move)) {
       if (outcome.next == kNoBelief) continue;
       const auto branch = std::ranges::find(node.branches, outcome.outcome, &PolicyBranch::outcome);
@@ -92,26 +94,30 @@ ExperienceMdp Transplant(BeliefGraph& graph, const Problem& problem_of_policy, c
     const std::optional<SetId> set = graph.sets().Find(hypotheses);
     if (!set || graph.sets().info(*set).goal || !graph.problem().workspace.Contains(node.robot + shift)) continue;
     const BeliefId b = graph.Intern(*set, node.robot + shift);
-    if (!builder.HasAction(b)) builder.AddTransition(b, node.move);
+    if (builder.Applicable(b, node.move)) builder.AddTransition(b, node.move);
   }
   return builder.Take();
 }
 
-double JumpHeuristic(const BeliefGraph& graph, BeliefId from, BeliefId to) {
-  if (!graph.sets().IsSubset(graph.set(to), graph.set(from), Cell::Zero())) {
-    return std::numeric_limits<double>::infinity();
-  }
+double JumpHeuristic(const BeliefGraph& graph, BeliefId from, BeliefId to, JumpKind jumps) {
+  const bool possible = jumps == JumpKind::kSameHypotheses
+                            ? graph.set(to) == graph.set(from)
+                            : graph.sets().IsSubset(graph.set(to), graph.set(from), Cell::Zero());
+  if (!possible) return std::numeric_limits<double>::infinity();
   const double distance = graph.problem().cost.per_cell * (graph.robot(from) - graph.robot(to)).cwiseAbs().sum();
   return std::max(distance, NormalisedHeuristic(graph, from) - NormalisedHeuristic(graph, to));
 }
 
-ExperienceHeuristic::ExperienceHeuristic(const BeliefGraph& graph, ExperienceMdp experience, double epsilon)
-    : graph_(graph), experience_(std::move(experience)), epsilon_(epsilon) {
+ExperienceHeuristic::ExperienceHeuristic(const BeliefGraph& graph, ExperienceMdp experience, double epsilon,
+                                         JumpKind jumps)
+    : graph_(graph), experience_(std::move(experience)), epsilon_(epsilon), jumps_(jumps) {
   const std::vector<ExperienceMdp::Entry>& entries = experience_.entries;
   values_.resize(entries.size());
   for (std::size_t i = 0; i < entries.size(); ++i) {  // Algorithm 2, lines 2-4
-    entry_of_[entries[i].belief] = i;
-    values_[i] = epsilon_ * NormalisedHeuristic(graph_, entries[i].belief);
+    const BeliefId b = entries[i].belief;
+    if (b >= entry_of_.size()) entry_of_.resize(b + std::size_t{1}, 0);
+    entry_of_[b] = static_cast<std::uint32_t>(i + 1);
+    values_[i] = epsilon_ * NormalisedHeuristic(graph_, b);
   }
   bool converged = false;
   while (!converged) {  // lines 5-9; successors first, so that one sweep carries values all the way up
@@ -121,9 +127,9 @@ ExperienceHeuristic::ExperienceHeuristic(const BeliefGraph& graph, ExperienceMdp
     for (std::size_t i = entries.size(); i-- > 0;) {
       const ExperienceMdp::Entry& entry = entries[i];
       double value = values_[i];
-      if (entry.has_action) {  // equation 6, second case
-        double followed = entry.cost;
-        for (const auto& [next, probability] : entry.branches) followed += probability * values_[next];
+      for (const ExperienceMdp::Transition& transition : entry.transitions) {  // equation 6, second case
+        double followed = transition.cost;
+        for (const auto& [next, probability] : transition.branches) followed += probability * values_[next];
         value = std::min(value, followed);
       }
       value = BestJump(entry.belief, value);  // equation 6, first case
@@ -136,32 +142,48 @@ ExperienceHeuristic::ExperienceHeuristic(const BeliefGraph& graph, ExperienceMdp
 
 void ExperienceHeuristic::ListTargets() {
   targets_.clear();
+  targets_of_.clear();
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const BeliefId b = experience_.entries[i].belief;
     const double heuristic = NormalisedHeuristic(graph_, b);
     // epsilon heur(b'') <= epsilon heur(b'',b) + epsilon heur(b): with no gain at b a jump there gains nothing.
     if (values_[i] >= epsilon_ * heuristic) continue;
-    targets_.push_back({b, graph_.set(b), graph_.robot(b), values_[i], heuristic});
+    targets_.push_back({graph_.set(b), graph_.robot(b), values_[i], heuristic});
   }
   std::ranges::stable_sort(targets_, {}, &Target::value);
+  if (jumps_ != JumpKind::kSameHypotheses) return;
+  for (const Target& target : targets_) targets_of_[target.set].push_back(target);
 }
 
-double ExperienceHeuristic::BestJump(BeliefId b, double best) const {
-  const SetId set = graph_.set(b);
+std::span<const ExperienceHeuristic::Target> ExperienceHeuristic::TargetsOf(SetId set) {
+  if (jumps_ == JumpKind::kSameHypotheses) {
+    const auto at = targets_of_.find(set);
+    return at != targets_of_.end() ? std::span<const Target>(at->second) : std::span<const Target>();
+  }
+  const auto [at, added] = targets_of_.try_emplace(set);
+  if (added) {
+    std::ranges::copy_if(targets_, std::back_inserter(at->second),
+                         [&](const Target& target) { return graph_.sets().IsSubset(target.set, set, Cell::Zero()); });
+  }
+  return at->second;
+}
+
+double ExperienceHeuristic::BestJump(BeliefId b, double best) {
+  const std::span<const Target> targets = TargetsOf(graph_.set(b));
+  if (targets.empty()) return best;
   const Cell robot = graph_.robot(b);
   const double heuristic = NormalisedHeuristic(graph_, b);
-  for (const Target& target : targets_) {
+  for (const Target& target : targets) {
     if (target.value >= best) break;
+    ++looks_;
     const double distance = graph_.problem().cost.per_cell * (robot - target.robot).cwiseAbs().sum();
-    const double value = epsilon_ * std::max(distance, heuristic - target.heuristic) + target.value;
-    if (value < best && graph_.sets().IsSubset(target.set, set, Cell::Zero())) best = value;
+    best = std::min(best, epsilon_ * std::max(distance, heuristic - target.heuristic) + target.value);
   }
   return best;
 }
 
-double ExperienceHeuristic::operator()(BeliefId b) const {
-  const auto known = entry_of_.find(b);
-  if (known != entry_of_.end()) return values_[known->second];
+double ExperienceHeuristic::operator()(BeliefId b) {
+  if (b < entry_of_.size() && entry_of_[b] != 0) return values_[entry_of_[b] - 1];
   return BestJump(b, epsilon_ * NormalisedHeuristic(graph_, b));
 }
 

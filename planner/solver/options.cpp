@@ -26,6 +26,14 @@ std::string_view ToString(HeuristicKind kind) {
   return "?";
 }
 
+std::string_view ToString(JumpKind kind) {
+  switch (kind) {
+    case JumpKind::kSameHypotheses: return "same";
+    case JumpKind::kSubsets: return "subsets";
+  }
+  return "?";
+}
+
 void Validate(const SolverOptions& options) {
   if (!std::isfinite(options.epsilon) || options.epsilon < 1.0) {
     throw InputError("epsilon", fmt::format("{} is below 1", options.epsilon), "the inflation is a number >= 1");
@@ -36,6 +44,9 @@ void Validate(const SolverOptions& options) {
   }
   if (!(options.time_limit_s > 0.0)) {
     throw InputError("time limit", fmt::format("{} s", options.time_limit_s), "give a positive number of seconds");
+  }
+  if (!(options.cpu_limit_s > 0.0)) {
+    throw InputError("CPU limit", fmt::format("{} s", options.cpu_limit_s), "give a positive number of seconds");
   }
   if (options.expansion_limit < 1) {
     throw InputError("expansion limit", fmt::format("{}", options.expansion_limit), "give at least 1");

@@ -16,9 +16,15 @@ enum class HeuristicKind {
   kLines,         ///< exact values of lines of hypotheses: medium, the paper setting
   kFirstContact,  ///< distance to the first possible contact: weak
 };
-/// "rtdp-bel", "e-rtdp-bel", "certified"; "certificate", "lines", "first-contact".
+/// Which beliefs of the experience E-RTDP-Bel may jump to (heur(b,b') of equation 5; see JumpHeuristic).
+enum class JumpKind {
+  kSameHypotheses,  ///< those with the same hypotheses: no policy leads from b to fewer for certain. The default
+  kSubsets,         ///< also those with fewer: a jump then counts the hypotheses it drops as dealt with
+};
+/// "rtdp-bel", "e-rtdp-bel", "certified"; "certificate", "lines", "first-contact"; "same", "subsets".
 std::string_view ToString(SolverKind kind);
 std::string_view ToString(HeuristicKind kind);
+std::string_view ToString(JumpKind kind);
 
 /// One row of the bounds table that a solver reports as it goes.
 struct BoundsRow {
@@ -41,6 +47,7 @@ struct SolverOptions {
   /// Certified solver: stop when expected cost <= gap * lower bound. >= 1; 1 proves optimality.
   double gap = 1.2;
   double time_limit_s = std::numeric_limits<double>::infinity();            ///< wall time; > 0
+  double cpu_limit_s = std::numeric_limits<double>::infinity();             ///< CPU time of the solving thread; > 0
   std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();  ///< the deterministic budget; >= 1
   /// Stop (as at an expansion limit) when the belief store has grown to this; about 1 kB an expansion.
   std::size_t memory_limit_bytes = std::size_t{1} << 31;
@@ -49,6 +56,7 @@ struct SolverOptions {
   /// Beliefs that are translates of each other count as one. Only used where that is exact: uniform weights, a generous
   /// workspace. Off is the paper's setting. E-RTDP-Bel always works without.
   bool canonical_translation = true;
+  JumpKind jumps = JumpKind::kSameHypotheses;       ///< of E-RTDP-Bel
   const CancellationToken* cancellation = nullptr;  ///< may be null
   std::function<void(const BoundsRow&)> on_bounds;  ///< the bounds table; may be empty; called from the solving thread
 };

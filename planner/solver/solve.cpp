@@ -79,7 +79,7 @@ class Attempt {
     ExperienceMdp mdp = experience_.kind == ExperienceKind::kRollout
                             ? RollOut(graph_, *experience_.policy)
                             : Transplant(graph_, *experience_.problem, *experience_.policy);
-    const ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon);
+    ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon, options_.jumps);
     RunRtdpBel([&](BeliefId b) { return graph_.Weight(b) * heuristic(b); });
   }
 

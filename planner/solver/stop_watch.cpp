@@ -1,5 +1,6 @@
 #include "planner/solver/stop_watch.h"
 
+#include <cmath>
 #include <ctime>
 
 namespace feeler::planner {
@@ -20,7 +21,9 @@ double StopWatch::wall_s() const {
 std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
   if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
   if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
-  if ((++calls_ & 63) == 0 && wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
+  if ((++calls_ & 63) != 0) return std::nullopt;
+  if (wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
+  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= options_.cpu_limit_s) return SolverStatus::kTimeLimit;
   return std::nullopt;
 }
 

@@ -40,7 +40,7 @@ LatticeProblemData Simpler(LatticeProblemData data) {
 double Normalised(const BeliefGraph& graph, BeliefId b) { return graph.Heuristic(b) / graph.Weight(b); }
 
 /// Equation 6 by value iteration over all entries and all jumps.
-std::vector<double> FixedPoint(const BeliefGraph& graph, const ExperienceMdp& mdp, double epsilon) {
+std::vector<double> FixedPoint(const BeliefGraph& graph, const ExperienceMdp& mdp, double epsilon, JumpKind jumps) {
   const std::size_t n = mdp.entries.size();
   std::vector<double> values(n);
   for (std::size_t i = 0; i < n; ++i) values[i] = epsilon * Normalised(graph, mdp.entries[i].belief);
@@ -49,12 +49,12 @@ std::vector<double> FixedPoint(const BeliefGraph& graph, const ExperienceMdp& md
     for (std::size_t i = 0; i < n; ++i) {
       double value = values[i];
       for (std::size_t j = 0; j < n; ++j) {
-        value =
-            std::min(value, epsilon * JumpHeuristic(graph, mdp.entries[i].belief, mdp.entries[j].belief) + values[j]);
+        value = std::min(
+            value, epsilon * JumpHeuristic(graph, mdp.entries[i].belief, mdp.entries[j].belief, jumps) + values[j]);
       }
-      if (mdp.entries[i].has_action) {
-        double followed = mdp.entries[i].cost;
-        for (const auto& [next, probability] : mdp.entries[i].branches) followed += probability * values[next];
+      for (const auto& transition : mdp.entries[i].transitions) {
+        double followed = transition.cost;
+        for (const auto& [next, probability] : transition.branches) followed += probability * values[next];
         value = std::min(value, followed);
       }
       changed = changed || value < values[i] - 1e-13;
@@ -89,14 +89,16 @@ TEST(Experience, HeuristicIsTheFixedPoint) {
     const SolverResult solved = Solve(simpler, Options(SolverKind::kRtdpBel, 2.0));
     if (!solved.complete()) continue;
     for (const double epsilon : {1.0, 2.0, 5.0}) {
-      for (const bool rollout : {true, false}) {
+      for (const int variant : {0, 1, 2, 3}) {
+        const bool rollout = variant % 2 == 0;
+        const JumpKind jumps = variant < 2 ? JumpKind::kSameHypotheses : JumpKind::kSubsets;
         const PlanningTables tables(problem, Options(SolverKind::kERtdpBel, epsilon));
         BeliefGraph graph(problem, tables.masks(), false);
         const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
         graph.SetHeuristic(heuristic.get());
         const ExperienceMdp mdp = rollout ? RollOut(graph, *solved.policy) : Transplant(graph, simpler, *solved.policy);
-        const ExperienceHeuristic experience(graph, mdp, epsilon);
-        const std::vector<double> judge = FixedPoint(graph, mdp, epsilon);
+        ExperienceHeuristic experience(graph, mdp, epsilon, jumps);
+        const std::vector<double> judge = FixedPoint(graph, mdp, epsilon, jumps);
         for (std::size_t i = 0; i < judge.size(); ++i) EXPECT_NEAR(experience.values()[i], judge[i], 1e-9);
         // Beliefs outside B^E: successors of its beliefs.
         for (std::size_t i = 0; i < mdp.entries.size(); ++i) graph.Actions(mdp.entries[i].belief);
@@ -104,9 +106,10 @@ TEST(Experience, HeuristicIsTheFixedPoint) {
           double equation_7 = epsilon * Normalised(graph, b);
           EXPECT_LE(experience(b), equation_7 + 1e-9);
           for (std::size_t i = 0; i < judge.size(); ++i) {
-            equation_7 = std::min(equation_7, epsilon * JumpHeuristic(graph, b, mdp.entries[i].belief) + judge[i]);
+            equation_7 =
+                std::min(equation_7, epsilon * JumpHeuristic(graph, b, mdp.entries[i].belief, jumps) + judge[i]);
           }
-          EXPECT_LE(experience(b), equation_7 + 1e-9);
+          EXPECT_NEAR(experience(b), equation_7, 1e-9);
         }
         ++experiences;
       }
@@ -126,12 +129,13 @@ TEST(Experience, JumpsAreConsistent) {
     if (start == kNoBelief || !std::isfinite(graph.Heuristic(start))) continue;
     for (BeliefId b = 0; b < graph.size() && graph.size() < 60; ++b) graph.Actions(b);
     const auto count = static_cast<BeliefId>(std::min<std::size_t>(graph.size(), 60));
+    const JumpKind jumps = index % 2 == 0 ? JumpKind::kSameHypotheses : JumpKind::kSubsets;
     for (BeliefId a = 0; a < count; ++a) {
       for (BeliefId b = 0; b < count; ++b) {
-        const double ab = JumpHeuristic(graph, a, b);
+        const double ab = JumpHeuristic(graph, a, b, jumps);
         EXPECT_LE(Normalised(graph, a), ab + Normalised(graph, b) + 1e-9);
         for (BeliefId c = 0; c < count; ++c) {
-          ASSERT_LE(JumpHeuristic(graph, a, c), ab + JumpHeuristic(graph, b, c) + 1e-9);
+          ASSERT_LE(JumpHeuristic(graph, a, c, jumps), ab + JumpHeuristic(graph, b, c, jumps) + 1e-9);
         }
       }
     }
