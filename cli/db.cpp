@@ -44,9 +44,7 @@ nlohmann::json ProblemJson(const policies::StoredProblem& problem) {
 workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags& flags) {
   const policies::DatabaseIdentity& identity = database.identity();
   ProgressBar bar("contact map");
-  workflow::PlanningSetupOptions options;
-  options.opening = ParseOpening(identity.opening);
-  options.goal = identity.goal == ToString(GoalKind::kSingleton) ? GoalKind::kSingleton : GoalKind::kInsertable;
+  workflow::PlanningSetupOptions options = workflow::SetupOptionsOf(identity);
   options.jobs = ParseJobs(flags.jobs);
   options.progress = bar.Callback();
   workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task.empty() ? identity.task : flags.task, options);
@@ -71,6 +69,10 @@ void Info(const Flags& flags) {
     json["fingerprint"] = identity.fingerprint;
     json["opening"] = identity.opening;
     json["goal"] = identity.goal;
+    json["cost"] = {{"per_cell", identity.cost.per_cell},
+                    {"per_contact", identity.cost.per_contact},
+                    {"per_action", identity.cost.per_action}};
+    json["cost_unit"] = workflow::CostUnit(identity);
     json["settings"] = nlohmann::json::parse(identity.settings);
     json["created_by"] = identity.created_by;
     json["content_digest"] = database.ContentDigest();
@@ -80,7 +82,10 @@ void Info(const Flags& flags) {
   fmt::print("task                {} ({})\n", identity.task, identity.fingerprint);
   fmt::print("opening, goal       {}, {}\n", identity.opening, identity.goal);
   fmt::print("settings            {}\n", identity.settings);
-  PrintInfo(database.Info());
+  const CostWeights& cost = identity.cost;
+  fmt::print("cost                {:g} a cell, {:g} a contact, {:g} a move, in {}\n", cost.per_cell, cost.per_contact,
+             cost.per_action, workflow::CostUnit(identity));
+  PrintInfo(database.Info(), workflow::CostUnit(identity));
   fmt::print("content             {}\n", database.ContentDigest());
 }
 

@@ -27,11 +27,11 @@ nlohmann::json InfoJson(const policies::DatabaseInfo& info) {
           {"ratios", ratios}};
 }
 
-void PrintInfo(const policies::DatabaseInfo& info) {
+void PrintInfo(const policies::DatabaseInfo& info, const std::string& unit) {
   fmt::print("problems            {}\n", info.problems);
   fmt::print("solved              {}\n", info.solved);
   for (const auto& [status, count] : info.statuses) fmt::print("  {:<18}{}\n", status, count);
-  fmt::print("expected cost, mean {:.2f}\n", info.expected_cost_mean);
+  fmt::print("expected cost, mean {:.2f} {}\n", info.expected_cost_mean, unit);
   fmt::print("certified ratio     mean {:.4f}, max {:.4f}\n", info.ratio_mean, info.ratio_max);
   std::int64_t largest = 1;
   for (const policies::RatioBin& bin : info.ratios) largest = std::max(largest, bin.count);

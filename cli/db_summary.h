@@ -10,6 +10,7 @@ namespace feeler::cli {
 /// ratios.
 nlohmann::json InfoJson(const policies::DatabaseInfo& info);
 /// The same for people, with the distribution of certified ratios, on stdout.
-void PrintInfo(const policies::DatabaseInfo& info);
+/// `unit` of the costs: workflow::CostUnit.
+void PrintInfo(const policies::DatabaseInfo& info, const std::string& unit);
 
 }  // namespace feeler::cli

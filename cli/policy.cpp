@@ -56,9 +56,7 @@ planner::ExpandedPolicy FromDatabase(const Flags& flags) {
   if (!stored) throw InputError(flags.db, "holds no problem " + flags.extents, "see feeler db list " + flags.db);
   if (!stored->policy) throw NegativeResult(flags.db, flags.extents + " holds no complete policy");
   const policies::DatabaseIdentity& identity = database.identity();
-  workflow::PlanningSetupOptions options;
-  options.opening = ParseOpening(identity.opening);
-  options.goal = ParseGoal(identity.goal);
+  const workflow::PlanningSetupOptions options = workflow::SetupOptionsOf(identity);
   const std::string task = flags.task.empty() ? identity.task : flags.task;
   return planner::ExpandPolicy(TaskProblem(flags, task, options, &database), *stored->policy);
 }

@@ -20,6 +20,7 @@ struct Flags {
   std::string out;
   std::string family;
   std::string opening = "closed";
+  std::string cost = "distance";
   std::string order = "uncertainty";
   std::string experience = "rollout";
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -50,6 +51,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
   setup_options.opening = ParseOpening(flags.opening);
+  setup_options.cost_kind = ParseCost(flags.cost);
   setup_options.jobs = options.jobs;
   setup_options.progress = map_bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
@@ -67,9 +69,11 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
              summary.problems, summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
              summary.cancelled ? "; interrupted, run the same command again to go on" : "");
   if (flags.json) {
-    PrintJson(InfoJson(build.info));
+    nlohmann::json json = InfoJson(build.info);
+    json["cost_unit"] = workflow::CostUnit(setup.cost_kind, setup.task().cost);
+    PrintJson(json);
   } else {
-    PrintInfo(build.info);
+    PrintInfo(build.info, workflow::CostUnit(setup.cost_kind, setup.task().cost));
   }
   if (summary.cancelled || summary.failed > 0) session.exit_code = 1;
 }
@@ -84,6 +88,8 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   command->add_option("--family", flags->family,
                       "problems, e.g. 2..15x2..15x2..15, or a JSON file of them (default: the task's ranges)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
+  command->add_option("--cost", flags->cost, "distance (the task's feeler_cost) or time, in seconds")
+      ->capture_default_str();
   command->add_option("--order", flags->order, "uncertainty or random (e-rtdp-bel)")->capture_default_str();
   command->add_option("--experience", flags->experience, "rollout, naive or none (e-rtdp-bel)")->capture_default_str();
   command->add_option("--jobs", flags->jobs, "threads; the content does not depend on it")->capture_default_str();

@@ -65,7 +65,7 @@ void RequireSane(const Flags& flags) {
 /// The problems that episodes draw from: the one given, else all that the database has a policy for, else the task's.
 planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies::Database* database) {
   if (!flags.extents.empty()) {
-    planner::ProblemFamily family{{planner::ParseExtents(flags.extents)}, flags.extents};
+    planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
     workflow::RequireWithinTask(family, task);
     return family;
   }
@@ -94,7 +94,7 @@ void Run(const Flags& flags, Session& session) {
 
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
-  if (database) setup_options.opening = ParseOpening(database->identity().opening);
+  if (database) setup_options = workflow::SetupOptionsOf(database->identity());
   setup_options.jobs = jobs;
   setup_options.progress = map_bar.Callback();
   const auto setup =

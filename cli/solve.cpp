@@ -24,6 +24,7 @@ struct Flags {
   std::string problem;
   std::string opening = "closed";
   std::string goal;
+  std::string cost = "distance";
   std::string out;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
@@ -35,6 +36,9 @@ planner::Problem LoadProblem(const Flags& flags) {
     throw InputError("solve", "give either --task with --extents, or --problem", "see feeler solve --help");
   }
   if (!flags.problem.empty()) {
+    if (ParseCost(flags.cost) == CostKind::kTime) {
+      throw InputError("--cost time", "a lattice problem has no times", "put the weights into its file");
+    }
     if (!flags.extents.empty()) {
       throw InputError("--extents", "goes with --task, not with --problem", "leave it out");
     }
@@ -46,6 +50,7 @@ planner::Problem LoadProblem(const Flags& flags) {
   ProgressBar bar("contact map");
   workflow::PlanningSetupOptions options;
   options.opening = ParseOpening(flags.opening);
+  options.cost_kind = ParseCost(flags.cost);
   if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
   options.jobs = ParseJobs(flags.jobs);
   options.progress = bar.Callback();
@@ -58,11 +63,11 @@ planner::Problem LoadProblem(const Flags& flags) {
 /// JSON has no infinity: null.
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
-void PrintResult(const planner::SolverResult& result) {
+void PrintResult(const planner::SolverResult& result, const std::string& unit) {
   fmt::print("status         {}\n", planner::ToString(result.status));
   if (result.complete()) {
-    fmt::print("expected cost  {:.6g}\nlower bound    {:.6g}\nratio          {:.4f}\npolicy nodes   {}\n",
-               result.expected_cost, result.lower_bound, result.Ratio(), result.policy->nodes.size());
+    fmt::print("expected cost  {:.6g} {}\nlower bound    {:.6g}\nratio          {:.4f}\npolicy nodes   {}\n",
+               result.expected_cost, unit, result.lower_bound, result.Ratio(), result.policy->nodes.size());
   } else {
     fmt::print("lower bound    {:.6g}\n", result.lower_bound);
   }
@@ -98,6 +103,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   }
   if (result.complete() && !flags.out.empty())
     WritePolicy(problem, *result.policy, flags.task.empty() ? problem.name : flags.task, flags.out);
+  const std::string unit = workflow::CostUnit(ParseCost(flags.cost), problem.cost);
   if (flags.json) {
     nlohmann::json pairs = nlohmann::json::array();
     for (const auto& [i, j] : result.indistinguishable) pairs.push_back({i, j});
@@ -108,6 +114,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                {"heuristic", planner::ToString(options.heuristic)},
                {"hypotheses", problem.hypotheses.size()},
                {"expected_cost", Number(result.expected_cost)},
+               {"cost_unit", unit},
                {"lower_bound", Number(result.lower_bound)},
                {"ratio", Number(result.Ratio())},
                {"trials", result.trials},
@@ -117,7 +124,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                {"policy_nodes", result.complete() ? result.policy->nodes.size() : 0},
                {"indistinguishable", pairs}});
   } else {
-    PrintResult(result);
+    PrintResult(result, unit);
   }
   if (!result.complete()) session.exit_code = 1;
 }
@@ -132,6 +139,8 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
+  command->add_option("--cost", flags->cost, "distance (the task's or file's weights) or time, in seconds")
+      ->capture_default_str();
   command->add_option("--out", flags->out, "policy file to write");
   command->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
   command->add_flag("--json", flags->json, "print the result as JSON");

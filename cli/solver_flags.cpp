@@ -26,7 +26,7 @@ void SolverFlags::AddTo(CLI::App& command) {
       .add_option("--setting", setting,
                   "fast: canonical translation, tight heuristic; paper: as printed, medium heuristic")
       ->capture_default_str();
-  command.add_option("--heuristic", heuristic, "certificate, lines or first-contact (default: the setting's)");
+  command.add_option("--heuristic", heuristic, "certificate, cuboids, lines or first-contact (default: the setting's)");
   command.add_option("--epsilon", epsilon, "inflation of the heuristic (rtdp-bel, e-rtdp-bel), >= 1")
       ->capture_default_str();
   command.add_option("--gap", gap, "stop at this ratio of expected cost to lower bound (certified), >= 1")
@@ -50,9 +50,10 @@ planner::SolverOptions SolverFlags::Options(const CLI::App& command) const {
     throw InputError("--setting", "unknown value \"" + setting + "\"", "choose one of fast, paper");
   }
   if (!heuristic.empty()) {
-    options.heuristic =
-        Choose("--heuristic", heuristic,
-               std::array{HeuristicKind::kCertificate, HeuristicKind::kLines, HeuristicKind::kFirstContact});
+    options.heuristic = Choose("--heuristic", heuristic,
+                               std::array{HeuristicKind::kCertificate, HeuristicKind::kCuboids, HeuristicKind::kLines,
+                                          HeuristicKind::kFirstContact});
+    options.cuboids_where_tight = false;
   }
   options.gap = gap;
   options.seed = ParseSeed(seed);
@@ -71,6 +72,10 @@ planner::ExperienceKind ParseExperience(const std::string& text) {
   using planner::ExperienceKind;
   return Choose("--experience", text,
                 std::array{ExperienceKind::kRollout, ExperienceKind::kNaive, ExperienceKind::kNone});
+}
+
+CostKind ParseCost(const std::string& text) {
+  return Choose("--cost", text, std::array{CostKind::kDistance, CostKind::kTime});
 }
 
 GoalKind ParseGoal(const std::string& text) {

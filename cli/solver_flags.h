@@ -30,6 +30,8 @@ struct SolverFlags {
 env::Opening ParseOpening(const std::string& text);
 /// --experience rollout|naive|none.
 planner::ExperienceKind ParseExperience(const std::string& text);
+/// --cost distance|time.
+CostKind ParseCost(const std::string& text);
 /// --goal singleton|insertable.
 GoalKind ParseGoal(const std::string& text);
 /// --seed, at least 0.

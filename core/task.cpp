@@ -18,6 +18,17 @@ std::string_view ToString(AxisKind kind) {
 
 std::string_view ToString(GoalKind kind) { return kind == GoalKind::kSingleton ? "singleton" : "insertable"; }
 
+std::string_view ToString(CostKind kind) { return kind == CostKind::kDistance ? "distance" : "time"; }
+
+CostWeights TimeCost(const Task& task) {
+  // A weight per cell cannot tell cells known to be free from those that are probed: the share that policies probe,
+  // measured 0.17 to 0.28 for cuboids of 7 to 15 cells.
+  constexpr double kProbedShare = 0.22;
+  const double per_cell_s =
+      task.cell_m * ((1.0 - kProbedShare) / task.times.transfer_speed_m_s + kProbedShare / task.times.probe_speed_m_s);
+  return {per_cell_s, task.times.time_per_contact_s, task.times.time_per_move_s};
+}
+
 Cell CuboidOf(const Task& task, const std::vector<int>& extents) {
   Cell cuboid = Cell::Ones();
   for (std::size_t i = 0; i < task.axes.size() && i < extents.size(); ++i) {

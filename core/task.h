@@ -33,6 +33,21 @@ struct CostWeights {
   bool operator==(const CostWeights&) const = default;
 };
 
+/// What the cost of a policy counts: what the task file says (distance, as a rule), or seconds on the robot.
+enum class CostKind { kDistance, kTime };
+std::string_view ToString(CostKind kind);
+
+/// How long localizing motions take, for costs in seconds. A way of some length takes (length / speed), where speed is
+/// what a longer way gains: motions are short, and setting out and stopping is in time_per_move_s. The defaults are
+/// measured on the simulated arm (docs/planner.md).
+struct MotionTimes {
+  double transfer_speed_m_s = 0.09;  ///< over ways known to be free
+  double probe_speed_m_s = 0.047;    ///< over ways where a contact may come
+  double time_per_move_s = 0.09;     ///< setting out and stopping
+  double time_per_contact_s = 0.13;  ///< coming off the wall and zeroing the sensor
+  bool operator==(const MotionTimes&) const = default;
+};
+
 /// When a belief counts as localized: one hypothesis left (the paper's), or all that are left are inserted by one
 /// motion within the tolerance of the task.
 enum class GoalKind { kSingleton, kInsertable };
@@ -61,12 +76,16 @@ struct Task {
   double insertion_depth_m = 0.0;  ///< travel from the mouth to fully inserted
   Tolerance tolerance;
   CostWeights cost;
+  MotionTimes times;
   GoalKind goal = GoalKind::kSingleton;
   std::vector<int> move_lengths = {1, 2, 4, 8, 16};
   Eigen::Vector3d workspace_m{0.2, 0.2, 0.1};  ///< half extents of the workspace of the tool around the start pose
   Pose world_T_target = Pose::Identity();      ///< nominal pose of the target, as the file places it
   Pose flange_T_tool = Pose::Identity();       ///< how the robot holds the tool
 };
+
+/// The weights in seconds that the times of the task come to.
+CostWeights TimeCost(const Task& task);
 
 /// Number of hypotheses along x, y and z at the extents given for the uncertain axes of the task (1 along a certain
 /// axis), in the order of task.axes. Angular axes do not count.

@@ -19,7 +19,8 @@ constexpr std::array kNumericFields = {
     "feeler_resolution",        "feeler_min_cells",          "feeler_max_cells",       "feeler_start_offset",
     "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth", "feeler_cell",
     "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle", "feeler_cost",
-    "feeler_flange_position",   "feeler_flange_quaternion"};
+    "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",  "feeler_probe_speed",
+    "feeler_time_per_move",     "feeler_time_per_contact"};
 constexpr std::array kTextFields = {"feeler_axes", "feeler_insertion_axis", "feeler_goal"};
 
 constexpr int kMaxCells = 64;       ///< hypotheses along an axis; beyond it a number is a slip, not a wish
@@ -237,6 +238,14 @@ void ReadVerdict(const Fields& fields, Task& task) {
     fields.FailNumber("feeler_cost", "is zero per cell and per action", "a move must cost something");
   }
   task.cost = {cost[0], cost[1], cost[2]};
+
+  const auto optional = [&](const char* field, double low, double high, double& value) {
+    if (fields.HasNumeric(field)) value = fields.Number(field, "one number", low, high);
+  };
+  optional("feeler_transfer_speed", 1e-4, 10.0, task.times.transfer_speed_m_s);
+  optional("feeler_probe_speed", 1e-4, 10.0, task.times.probe_speed_m_s);
+  optional("feeler_time_per_move", 0.0, 100.0, task.times.time_per_move_s);
+  optional("feeler_time_per_contact", 0.0, 100.0, task.times.time_per_contact_s);
 
   const std::string goal = fields.Text("feeler_goal", "singleton or insertable");
   if (goal == ToString(GoalKind::kSingleton)) {

@@ -43,6 +43,7 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
     settings["order"] = options.order == planner::ProblemOrder::kUncertainty ? "uncertainty" : "random";
     settings["order_seed"] = options.seed;
   }
+  if (setup.cost_kind == CostKind::kTime) settings["cost"] = ToString(setup.cost_kind);
   policies::DatabaseIdentity identity;
   identity.task = setup.task().name;
   identity.fingerprint = setup.fingerprint;
