@@ -193,7 +193,8 @@ DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
 
 void RequireSameIdentity(const Meta& stored, const DatabaseIdentity& identity, const std::string& path) {
   const Meta wanted = ToMeta(identity);
-  for (const char* key : {"task", "fingerprint", "opening", "goal", "cost", "settings"}) {
+  // The fingerprint covers costs and goal, too: they are named first.
+  for (const char* key : {"task", "cost", "opening", "goal", "fingerprint", "settings"}) {
     const std::string& have = stored.at(key);
     const std::string& want = wanted.at(key);
     if (have == want) continue;
