@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "env/collision_filter.h"
 
 namespace feeler::env {
 namespace {
@@ -25,6 +26,7 @@ void RouteMujocoMessages() {
   static const bool routed = [] {
     mju_user_warning = KeepWarning;
     mju_user_error = ThrowError;
+    InstallCollisionFilter();
     return true;
   }();
   (void)routed;

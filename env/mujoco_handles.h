@@ -20,7 +20,8 @@ using ModelHandle = std::unique_ptr<mjModel, ModelDeleter>;
 using DataHandle = std::unique_ptr<mjData, DataDeleter>;
 
 /// Routes MuJoCo's messages: a warning is kept per thread (TakeMujocoWarning), an error is thrown as WorldError;
-/// neither writes a file nor ends the process. Idempotent and thread-safe; every loader below calls it.
+/// neither writes a file nor ends the process. Installs the collision filter (env/collision_filter.h) as well.
+/// Idempotent and thread-safe; every loader below calls it.
 void RouteMujocoMessages();
 
 /// The last warning MuJoCo gave on this thread since the last call; empty when there was none.

@@ -224,8 +224,10 @@ Image RenderSceneImage(const Scene& scene, const Pose& world_T_tool, SceneView v
   ResetScene(scene, best, *data);
   RendererOptions still = options;
   still.shadow_resolution = 8192;
-  Renderer renderer(scene.model, still);
-  return renderer.Color(*data, view == SceneView::kOverview ? OverviewCamera(scene) : CloseUpCamera(scene));
+  Renderer renderer(scene.drawn_model, still);
+  const DataHandle drawn = MakeData(*scene.drawn_model);
+  CopyForDrawing(scene, *data, *drawn);
+  return renderer.Color(*drawn, view == SceneView::kOverview ? OverviewCamera(scene) : CloseUpCamera(scene));
 }
 
 Image RenderSceneImage(const Scene& scene, SceneView view, const RendererOptions& options) {

@@ -52,7 +52,7 @@ struct RendererOptions {
 /// A renderer may move between threads, but only one may use it at a time; several may exist.
 class Renderer {
  public:
-  /// Throws InputError when EGL is not there or cannot make a context.
+  /// `model`: of a scene, the `drawn_model`. Throws InputError when EGL is not there or cannot make a context.
   explicit Renderer(std::shared_ptr<const mjModel> model, const RendererOptions& options = {});
   ~Renderer();
   Renderer(const Renderer&) = delete;

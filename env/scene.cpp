@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "env/gripper.h"
+#include "env/physics_model.h"
 #include "env/scene_decor.h"
 #include "env/urdf_to_mjcf.h"
 
@@ -107,6 +108,9 @@ void AddSettings(const SceneOptions& options, XMLElement& mujoco) {
   XMLElement& size = *mujoco.InsertNewChildElement("size");
   size.SetAttribute("njmax", options.max_constraints);
   size.SetAttribute("nconmax", options.max_contacts);
+  // In numbers of 8 bytes. MuJoCo's own guess is 5 njmax^2, for solvers that invert the constraint space; Newton with
+  // six joints used 1500 at 50 contacts.
+  size.SetAttribute("nstack", 32768);
 
   // Contact parameters are defaults, so that a geom of the task file may have its own.
   XMLElement* defaults = mujoco.FirstChildElement("default");
@@ -264,7 +268,8 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   Scene scene;
   scene.task = task;
   scene.xml = printer.CStr();
-  scene.model = std::shared_ptr<const mjModel>(CompileMjcf(scene.xml, where).release(), ModelDeleter());
+  scene.drawn_model = std::shared_ptr<const mjModel>(CompileMjcf(scene.xml, where).release(), ModelDeleter());
+  scene.model = CompilePhysicsModel(scene.xml, scene.drawn_model, Scene::kLidGroup, where);
   scene.flange_T_tool = task.flange_T_tool;
   Index(robot.joints, robot.root_body->Attribute("name"), scene);
   constexpr double kQuarter = 0.5 * std::numbers::pi;
@@ -300,6 +305,17 @@ void ResetScene(const Scene& scene, const JointVector& q_rad, mjData& data) {
   SetJointPositions(scene, q_rad, data);
   SetTargetPose(scene, scene.task.world_T_target, data);
   mj_forward(scene.model.get(), &data);
+}
+
+void CopyForDrawing(const Scene& scene, const mjData& state, mjData& drawn) {
+  const mjModel* model = scene.drawn_model.get();
+  drawn.time = state.time;
+  std::copy(state.qpos, state.qpos + model->nq, drawn.qpos);
+  std::copy(state.mocap_pos, state.mocap_pos + 3 * model->nmocap, drawn.mocap_pos);
+  std::copy(state.mocap_quat, state.mocap_quat + 4 * model->nmocap, drawn.mocap_quat);
+  mj_kinematics(model, &drawn);
+  mj_comPos(model, &drawn);
+  mj_camlight(model, &drawn);
 }
 
 void SetTargetPose(const Scene& scene, const Pose& world_T_target, mjData& data) {

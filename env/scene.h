@@ -28,7 +28,7 @@ struct SceneOptions {
   double armature_kg_m2 = 0.1;
   double contact_friction = 0.3;  ///< sliding friction where the task file gives none
   bool workbench = true;          ///< a bench under robot and fixtures and a floor, unless the task file has its own
-  int max_constraints = 200;      ///< njmax; mjData grows with its square (2.3 MB at 200)
+  int max_constraints = 200;      ///< njmax; mjData grows with its square (0.9 MB at 200)
   int max_contacts = 100;         ///< nconmax
 };
 
@@ -48,7 +48,9 @@ struct Scene {
   static constexpr int kLidGroup = 4;
 
   Task task;
-  std::shared_ptr<const mjModel> model;
+  std::shared_ptr<const mjModel> model;  ///< for physics: only what can touch, and the lids
+  /// For pictures: with all that is only seen. Same bodies and joints; geoms have other numbers. CopyForDrawing.
+  std::shared_ptr<const mjModel> drawn_model;
   std::string xml;  ///< the assembled MJCF, for people and for tests
 
   std::array<int, kJointCount> joint{};     ///< mjModel joint ids
@@ -87,6 +89,9 @@ Scene BuildScene(const Task& task, const std::string& task_xml, const std::strin
 
 /// Joints at `q_rad`, at rest, target at its nominal pose, time zero, all else cleared; kinematics up to date.
 void ResetScene(const Scene& scene, const JointVector& q_rad, mjData& data);
+
+/// The state of physics into data of `scene.drawn_model`, ready for a Renderer.
+void CopyForDrawing(const Scene& scene, const mjData& state, mjData& drawn);
 
 /// Moves the target; call mj_forward (or step) afterwards.
 void SetTargetPose(const Scene& scene, const Pose& world_T_target, mjData& data);

@@ -33,19 +33,19 @@ EpisodeRecord RecordEpisodeVideo(EpisodeRunner& runner, std::uint64_t episode, c
   env::RendererOptions half;
   half.width = kWidth / 2;
   half.height = kHeight;
-  env::Renderer renderer(scene.model, half);
+  env::Renderer renderer(scene.drawn_model, half);
   env::VideoOptions video_options;
   video_options.width = kWidth;
   video_options.height = kHeight;
   video_options.frames_per_second = kFramesPerSecond;
   env::VideoWriter video(path, video_options);
-  const env::DataHandle frame = env::MakeData(*scene.model);
+  const env::DataHandle frame = env::MakeData(*scene.drawn_model);
   const env::Camera overview = env::OverviewCamera(scene);
   const env::Camera close_up = env::CloseUpCamera(scene);
 
   robot.SetObserver(
       [&](const env::World& world) {
-        mj_copyData(frame.get(), scene.model.get(), &world.data());
+        env::CopyForDrawing(scene, world.data(), *frame);
         video.Add(Beside(renderer.Color(*frame, overview), renderer.Color(*frame, close_up)));
         // How long the episode will last is not known: the bar shows frames against the usual length of 300.
         if (progress) progress(video.frames(), std::max<std::int64_t>(300, video.frames() + 1));

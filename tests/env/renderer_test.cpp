@@ -51,9 +51,9 @@ class TemporaryFolder {
 
 TEST(Renderer, DepthAgreesWithRayCasting) {
   const Scene& scene = PlugScene();
-  const DataHandle data = MakeData(*scene.model);
+  const DataHandle data = MakeData(*scene.drawn_model);
   ResetScene(scene, scene.home_q_rad, *data);
-  Renderer renderer(scene.model, Small());
+  Renderer renderer(scene.drawn_model, Small());
   for (const FreeCamera& camera : {OverviewCamera(scene), CloseUpCamera(scene)}) {
     const DepthImage depth = renderer.Depth(*data, camera);
     const CameraModel model = renderer.Model(*data, camera);
@@ -70,7 +70,7 @@ TEST(Renderer, DepthAgreesWithRayCasting) {
       const Eigen::Vector3d origin = model.world_T_camera.translation();
       int geom = -1;
       const double distance =
-          mj_ray(scene.model.get(), data.get(), origin.data(), ray.data(), drawn.data(), 1, -1, &geom);
+          mj_ray(scene.drawn_model.get(), data.get(), origin.data(), ray.data(), drawn.data(), 1, -1, &geom);
       if (distance > 0.0) errors.push_back(std::abs(depth.at(v, u) - distance));  // along the ray, z = 1 a unit
     }
     ASSERT_GT(errors.size(), 500U);
@@ -83,22 +83,22 @@ TEST(Renderer, DepthAgreesWithRayCasting) {
 
 TEST(Renderer, SameStateSamePictureAndMotionIsSeen) {
   const Scene& scene = PlugScene();
-  const DataHandle data = MakeData(*scene.model);
+  const DataHandle data = MakeData(*scene.drawn_model);
   ResetScene(scene, scene.home_q_rad, *data);
   const Camera camera = CloseUpCamera(scene);
   Image first;
   {
-    Renderer renderer(scene.model, Small());
+    Renderer renderer(scene.drawn_model, Small());
     first = renderer.Color(*data, camera);
     renderer.Depth(*data, camera);
     EXPECT_EQ(renderer.Color(*data, camera).rgb, first.rgb) << "a depth picture in between changes nothing";
   }
-  Renderer another(scene.model, Small());
+  Renderer another(scene.drawn_model, Small());
   EXPECT_EQ(another.Color(*data, camera).rgb, first.rgb);
   EXPECT_GT(*std::max_element(first.rgb.begin(), first.rgb.end()), 100);
   EXPECT_LT(*std::min_element(first.rgb.begin(), first.rgb.end()), 60);
   SetTargetPose(scene, scene.task.world_T_target * Eigen::Translation3d(0.01, 0.0, 0.0), *data);
-  mj_forward(scene.model.get(), data.get());
+  mj_forward(scene.drawn_model.get(), data.get());
   EXPECT_NE(another.Color(*data, camera).rgb, first.rgb);
   EXPECT_THROW(another.Color(*data, NamedCamera{"no such camera"}), InputError);
 }
@@ -110,7 +110,7 @@ TEST(Renderer, SceneImageShowsTaskOrSaysWhyNot) {
   EXPECT_THROW(RenderSceneImage(scene, MakePose(Eigen::Vector3d(5, 0, 0)), SceneView::kOverview, Small()), InputError);
   RendererOptions absurd;
   absurd.width = -1;
-  EXPECT_THROW(Renderer(scene.model, absurd), InputError);
+  EXPECT_THROW(Renderer(scene.drawn_model, absurd), InputError);
 }
 
 std::uint32_t BigEndian(const std::string& bytes, std::size_t at) {
