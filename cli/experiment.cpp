@@ -25,7 +25,7 @@ struct Flags {
 
 void List() {
   for (const evaluation::Experiment& experiment : evaluation::Experiments()) {
-    fmt::print("{:<16} {}\n", experiment.name, experiment.summary);
+    fmt::print("{:<24} {}\n", experiment.name, experiment.summary);
   }
 }
 

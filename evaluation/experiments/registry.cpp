@@ -3,6 +3,9 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "evaluation/experiments/acceptance_closed_loop.h"
+#include "evaluation/experiments/acceptance_guarded_moves.h"
+#include "evaluation/experiments/acceptance_transfers.h"
 #include "evaluation/experiments/bounds.h"
 #include "evaluation/experiments/table1_plug.h"
 #include "evaluation/experiments/table3_ablation.h"
@@ -15,6 +18,11 @@ std::string PartialFile(const ExperimentRequest& request, const std::string& nam
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> kExperiments = {
+      {kAcceptanceClosedLoopName, "episodes in physics at full size, with and without fallbacks, under every noise",
+       RunAcceptanceClosedLoop},
+      {kAcceptanceGuardedMovesName, "guarded moves in physics against geometry", RunAcceptanceGuardedMoves},
+      {kAcceptanceTransfersName, "transfers among obstacles in four scenes: planned, and carried out in physics",
+       RunAcceptanceTransfers},
       {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug},
       {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",

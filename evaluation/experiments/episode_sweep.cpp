@@ -1,0 +1,202 @@
+#include "evaluation/experiments/episode_sweep.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "evaluation/episode_json.h"
+#include "evaluation/experiments/cell_store.h"
+#include "planner/preprocess/problem_family.h"
+#include "workflow/database_builder.h"
+#include "workflow/episode.h"
+#include "workflow/planning_setup.h"
+
+namespace feeler::evaluation {
+namespace {
+
+using nlohmann::json;
+
+/// Certified ratio up to which the policies of the episodes are solved: the default of `feeler preprocess`.
+constexpr double kGap = 1.2;
+
+/// The records that a file holds, without a last line that was cut off while it was written.
+std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& setting, std::uint64_t seed) {
+  std::vector<json> records;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return records;
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const std::string noise = workflow::ParseNoise(setting.noise).name;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = text.find('\n', begin);
+    if (end == std::string::npos) break;
+    json record = json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
+                              text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    const auto is = [&](const char* key, const json& value) { return record.contains(key) && record[key] == value; };
+    if (!record.is_object() || !is("episode", records.size()) || !is("seed", seed) || !is("noise", noise)) {
+      throw InputError(path + " line " + std::to_string(records.size() + 1), "is not the record expected there",
+                       "delete the folder of the experiment, or choose another");
+    }
+    records.push_back(std::move(record));
+    begin = end + 1;
+  }
+  if (begin < text.size()) std::filesystem::resize_file(path, begin);
+  return records;
+}
+
+std::string FileName(const std::string& name) {
+  std::string file = name;
+  std::replace(file.begin(), file.end(), ' ', '_');
+  return file + ".jsonl";
+}
+
+}  // namespace
+
+json ToJson(const EpisodeSetting& setting) {
+  return {{"name", setting.name},
+          {"task", setting.task},
+          {"policy", setting.policy},
+          {"extents", setting.extents},
+          {"noise", setting.noise},
+          {"ladder", setting.ladder},
+          {"confirm_limit_m", setting.confirm_limit_m ? json(*setting.confirm_limit_m) : json()},
+          {"episodes", setting.episodes}};
+}
+
+EpisodeStatistics StatisticsOf(const std::vector<json>& records) {
+  EpisodeStatistics statistics;
+  int inserted = 0;
+  int localized = 0;
+  int ladder_used = 0;
+  std::vector<double> times, errors, moves, contacts, paths, cpu;
+  statistics.failures = json::object();
+  for (const json& record : records) {
+    localized += record.at("localized").get<bool>() ? 1 : 0;
+    ladder_used += record.at("ladder").empty() ? 0 : 1;
+    if (record.at("inserted").get<bool>()) {
+      ++inserted;
+      times.push_back(record.at("sim_time_s").get<double>());
+    } else {
+      const std::string reason = record.at("reason").get<std::string>();
+      json& count = statistics.failures[reason.substr(0, reason.find(':'))];
+      count = count.is_null() ? 1 : count.get<int>() + 1;
+      statistics.failed.push_back(record.at("episode").get<std::int64_t>());
+    }
+    if (!record.at("error").is_null()) errors.push_back(record["error"].at("lateral_m").get<double>());
+    moves.push_back(record.at("policy_moves").get<double>());
+    contacts.push_back(record.at("contacts").get<double>());
+    paths.push_back(record.at("path_length_m").get<double>());
+    cpu.push_back(record.at("timing").at("cpu_s").get<double>());
+    statistics.peak_force_max_n = std::max(statistics.peak_force_max_n, record.at("peak_force_n").get<double>());
+  }
+  const int count = static_cast<int>(records.size());
+  statistics.inserted = WilsonRate(inserted, count);
+  statistics.localized = WilsonRate(localized, count);
+  statistics.ladder_used = WilsonRate(ladder_used, count);
+  statistics.sim_time_mean_s = Mean(times);
+  statistics.sim_time_median_s = Median(times);
+  statistics.sim_time_max_s = times.empty() ? 0.0 : *std::max_element(times.begin(), times.end());
+  statistics.lateral_error_median_m = Median(errors);
+  statistics.lateral_error_p95_m = Quantile(errors, 0.95);
+  statistics.moves_mean = Mean(moves);
+  statistics.contacts_mean = Mean(contacts);
+  statistics.path_length_mean_m = Mean(paths);
+  statistics.cpu_mean_s = Mean(cpu);
+  return statistics;
+}
+
+EpisodeSweep::EpisodeSweep(std::string experiment, std::vector<EpisodeSetting> settings,
+                           const ExperimentRequest& request)
+    : experiment_(std::move(experiment)), settings_(std::move(settings)), request_(request) {}
+
+std::string EpisodeSweep::RecordsFile(const EpisodeSetting& setting) const {
+  return request_.out + "/" + experiment_ + "/" + FileName(setting.name);
+}
+
+json EpisodeSweep::SettingsJson() const {
+  json settings = {{"experiment", experiment_}, {"version", FEELER_VERSION}, {"seed", request_.seed}};
+  for (const EpisodeSetting& setting : settings_) settings["rows"].push_back(ToJson(setting));
+  return settings;
+}
+
+bool EpisodeSweep::Run() {
+  std::int64_t total = 0;
+  std::vector<std::string> tasks;
+  for (const EpisodeSetting& setting : settings_) {
+    total += setting.episodes;
+    workflow::ParseNoise(setting.noise);
+    if (std::find(tasks.begin(), tasks.end(), setting.task) == tasks.end()) tasks.push_back(setting.task);
+  }
+  std::filesystem::create_directories(request_.out + "/" + experiment_);
+  std::filesystem::create_directories(request_.out + "/databases");
+  // Refuses a folder that was begun under other settings.
+  const CellStore store(PartialFile(request_, experiment_), SettingsJson());
+  std::int64_t done = 0;
+  for (const std::string& task : tasks) {
+    if (!RunTask(task, done, total)) return false;
+  }
+  return true;
+}
+
+bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int64_t total) {
+  workflow::PlanningSetupOptions setup_options;
+  setup_options.jobs = request_.jobs;
+  setup_options.progress = request_.map_progress;
+  const auto setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
+
+  planner::ProblemFamily needed;
+  std::set<std::string> seen;
+  for (const EpisodeSetting& setting : settings_) {
+    if (setting.task != task || !seen.insert(setting.extents).second) continue;
+    needed.problems.push_back(planner::ParseExtents(setting.extents));
+    needed.spec += (needed.spec.empty() ? "" : ",") + setting.extents;
+  }
+  workflow::RequireWithinTask(needed, setup->task());
+  planner::PreprocessOptions build;
+  build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
+  build.solver.gap = kGap;
+  build.jobs = request_.jobs;
+  build.cancellation = request_.cancellation;
+  const std::string database_file = request_.out + "/databases/" + setup->task().name + ".db";
+  if (workflow::BuildDatabase(*setup, needed, build, database_file).summary.cancelled) return false;
+  const auto database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(database_file));
+
+  const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
+  for (const EpisodeSetting& setting : settings_) {
+    if (setting.task != task) continue;
+    const std::string file = RecordsFile(setting);
+    const auto first = static_cast<std::int64_t>(ReadFinished(file, setting, request_.seed).size());
+    workflow::EpisodeOptions options;
+    options.seed = request_.seed;
+    options.family = {{planner::ParseExtents(setting.extents)}, setting.extents};
+    options.noise = setting.noise;
+    options.ladder = setting.ladder;
+    options.confirm_limit_m = setting.confirm_limit_m;
+    const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, database);
+    std::ofstream out(file, std::ios::app);
+    if (!out) throw InputError(file, "cannot be written", "choose another folder");
+    workflow::RunEpisodes(
+        {first, setting.episodes}, request_.jobs,
+        [&] { return workflow::EpisodeRunner(setup, scene, factory, options); },
+        [&](const workflow::EpisodeRecord& record) { out << ToJson(record).dump() << "\n"
+                                                         << std::flush; },
+        [&](std::int64_t episodes, std::int64_t) {
+          if (request_.progress) request_.progress(done + episodes, total);
+        },
+        request_.cancellation);
+    if (!out) throw InputError(file, "cannot be written", "check the free space");
+    if (request_.cancellation != nullptr && request_.cancellation->cancelled()) return false;
+    done += setting.episodes;
+  }
+  return true;
+}
+
+std::vector<json> EpisodeSweep::Records(const EpisodeSetting& setting) const {
+  return ReadFinished(RecordsFile(setting), setting, request_.seed);
+}
+
+}  // namespace feeler::evaluation

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluation/experiments/experiment.h"
+#include "evaluation/statistics.h"
+
+namespace feeler::evaluation {
+
+/// Episodes of one setting: a row of an experiment in physics.
+struct EpisodeSetting {
+  std::string name;  ///< distinct within an experiment; letters, digits, hyphens and blanks
+  std::string task = "plug";
+  std::string policy = "database";
+  std::string extents;  ///< the problem that every episode has, e.g. "7x7x7"
+  std::string noise = "ideal";
+  bool ladder = true;
+  std::optional<double> confirm_limit_m;  ///< default: the executor's
+  std::int64_t episodes = 300;
+};
+nlohmann::json ToJson(const EpisodeSetting& setting);
+
+/// What the episodes of a setting came to, from their records alone.
+struct EpisodeStatistics {
+  Rate inserted;
+  Rate localized;
+  Rate ladder_used;  ///< episodes in which a fallback was tried
+  double sim_time_mean_s = 0.0;
+  double sim_time_median_s = 0.0;
+  double sim_time_max_s = 0.0;          ///< these three over inserted episodes
+  double lateral_error_median_m = 0.0;  ///< of the final estimate, across the insertion axis, where there is one
+  double lateral_error_p95_m = 0.0;
+  double moves_mean = 0.0;
+  double contacts_mean = 0.0;
+  double path_length_mean_m = 0.0;
+  double peak_force_max_n = 0.0;
+  double cpu_mean_s = 0.0;           ///< measured: differs from run to run
+  nlohmann::json failures;           ///< reason -> episodes not inserted
+  std::vector<std::int64_t> failed;  ///< their numbers
+};
+/// `records`: as in a records file (docs/file-formats.md).
+EpisodeStatistics StatisticsOf(const std::vector<nlohmann::json>& records);
+
+/// Runs settings one after the other, each on several threads, and keeps every episode record in
+/// OUT/EXPERIMENT/SETTING.jsonl. An interrupted run goes on with the episode that it stopped at. The databases that the
+/// policies read are made first, in OUT/databases, for just the problems needed.
+class EpisodeSweep {
+ public:
+  /// `experiment` names the folder of the records. Episode k has the same draws under every setting.
+  EpisodeSweep(std::string experiment, std::vector<EpisodeSetting> settings, const ExperimentRequest& request);
+
+  /// False if it was cancelled. Throws InputError for an unknown task, policy or noise before the first episode runs.
+  bool Run();
+
+  const std::vector<EpisodeSetting>& settings() const { return settings_; }
+  /// The records of a setting in order of episode. After Run returned true.
+  std::vector<nlohmann::json> Records(const EpisodeSetting& setting) const;
+  /// Everything that shaped the result.
+  nlohmann::json SettingsJson() const;
+
+ private:
+  std::string RecordsFile(const EpisodeSetting& setting) const;
+  bool RunTask(const std::string& task, std::int64_t& done, std::int64_t total);
+
+  std::string experiment_;
+  std::vector<EpisodeSetting> settings_;
+  const ExperimentRequest& request_;
+};
+
+}  // namespace feeler::evaluation
