@@ -1,6 +1,9 @@
 #pragma once
 
+#include <memory>
+
 #include "execution/contact_evidence.h"
+#include "execution/online_planner.h"
 #include "execution/outcome_matching.h"
 
 namespace feeler::execution {
@@ -26,6 +29,10 @@ struct ExecutorOptions {
   double insertion_overdrive_m = 0.001;  ///< commanded beyond the depth, so that a compliant tool reaches it
   int motion_limit = 400;                ///< motions of one episode, whatever the policy
   double time_limit_s = 120.0;           ///< of one episode, on the clock of the robot
+  /// What is tried, in this order, when the policy or the insertion fails (fallback_ladder.h).
+  bool ladder = false;
+  /// Plans around a refit; may be shared by many executors. Null: one is made when first needed.
+  std::shared_ptr<OnlinePlanner> online_planner;
   MatchOptions matching;
   FitOptions fit;
 

@@ -30,14 +30,14 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
     const Cell candidate = Nearest(cells * out - map.phase());
     if (IsClear(map, candidate, orientation)) gate = candidate;
   }
-  if (!gate) throw ExecutionFailure("insertion: no free place in front of the opening");
+  if (!gate) throw LostTrack("insertion: no free place in front of the opening");
   const Cell here = NearestFree(map, mover.position() - target, orientation);
   auto path = FindFreePath(
       map, here, [&](const Cell& cell) { return cell == *gate; }, orientation);
-  if (!path) throw ExecutionFailure("insertion: no free way to the opening");
+  if (!path) throw LostTrack("insertion: no free way to the opening");
   if (path->size() > 1) path->pop_back();  // the last leg ends exactly in front of the opening, not at a lattice point
   if (!FollowPath(map, target, *path, "approach", mover, evidence)) {
-    return {false, "insertion: unexpected contact on the way to the opening"};
+    return {false, false, "insertion: unexpected contact on the way to the opening"};
   }
   // In front of the opening, exactly; then near it.
   const Eigen::Vector3d gate_displacement = gate->cast<double>() + map.phase();
@@ -47,11 +47,15 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
     if ((mover.position() - place).norm() < 0.05) continue;
     if (mover.Fast(place, "approach").contact) {
       mover.Retreat(place + out);
-      return {false, "insertion: unexpected contact in front of the opening"};
+      return {false, false, "insertion: unexpected contact in front of the opening"};
     }
   }
   mover.ZeroWrench();
+  return InsertFromHere(task, target, mover);
+}
 
+InsertionVerdict InsertFromHere(const Task& task, const Eigen::Vector3d& target, Mover& mover) {
+  const Eigen::Vector3d out = -UnitVector(task.insertion);
   const double depth = mover.Cells(task.insertion_depth_m);
   const double overdrive = mover.Cells(mover.options().insertion_overdrive_m);
   const MotionReport report = mover.Insert(target - (depth + overdrive) * out);
@@ -61,15 +65,17 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
   lateral[AxisOf(task.insertion)] = 0.0;
   const double cell_m = mover.frame().cell_m;
   if ((depth - reached) * cell_m > task.tolerance.vertical_m) {
-    return {false, fmt::format("insertion: stopped after {:.2f} of {:.2f} mm ({})", 1e3 * reached * cell_m,
-                               1e3 * task.insertion_depth_m, ToString(report.reason))};
+    return {false, true,
+            fmt::format("insertion: stopped after {:.2f} of {:.2f} mm ({})", 1e3 * reached * cell_m,
+                        1e3 * task.insertion_depth_m, ToString(report.reason))};
   }
   // An axis that is wrong by more than the tolerance and still at depth is beside the opening, not in it.
   if (lateral.cwiseAbs().maxCoeff() * cell_m > 2.0 * task.tolerance.lateral_m) {
-    return {false, fmt::format("insertion: at depth, but {:.2f} mm beside the opening",
-                               1e3 * lateral.cwiseAbs().maxCoeff() * cell_m)};
+    return {false, true,
+            fmt::format("insertion: at depth, but {:.2f} mm beside the opening",
+                        1e3 * lateral.cwiseAbs().maxCoeff() * cell_m)};
   }
-  return {true, "inserted"};
+  return {true, false, "inserted"};
 }
 
 }  // namespace feeler::execution

@@ -14,6 +14,8 @@ namespace feeler::execution {
 /// What the executor believes about an insertion, from the measured end pose and its estimate of the target.
 struct InsertionVerdict {
   bool inserted = false;
+  /// The tool stood on something where the opening should be, or a little in it.
+  bool blocked = false;
   std::string reason;  ///< "inserted", or why not
 };
 
@@ -22,5 +24,8 @@ struct InsertionVerdict {
 /// evidence and end the attempt.
 InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
                                    int orientation, Mover& mover, std::vector<Touch>& evidence);
+
+/// The part of it that begins in front of the opening, or in its mouth.
+InsertionVerdict InsertFromHere(const Task& task, const Eigen::Vector3d& target, Mover& mover);
 
 }  // namespace feeler::execution

@@ -69,7 +69,7 @@ policies::Insert Localizer::Run() {
     const policies::Decision decision = Ask();
     if (const auto* insert = std::get_if<policies::Insert>(&decision)) return *insert;
     if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
-      throw ExecutionFailure("policy gave up: " + give_up->reason);
+      throw LostTrack("policy gave up: " + give_up->reason);
     }
     if (tracked_.size() == 1) return {};  // readings are finer than outcomes: they may tell before the policy does
     const GuardedMove move = std::get<GuardedMove>(decision);
@@ -235,7 +235,7 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tol
     robot_ += match.outcome.cells * UnitCell(move.direction);
     return true;
   }
-  if (!matches.empty()) throw ExecutionFailure("policy: no branch for any outcome that explains the reading");
+  if (!matches.empty()) throw LostTrack("policy: no branch for any outcome that explains the reading");
   return false;
 }
 
@@ -273,9 +273,9 @@ void Localizer::FailOffTree(const Touch& touch) const {
   const double cell_mm = 1e3 * mover_.frame().cell_m;
   const std::string expected = nearest < 1e6 ? fmt::format("nearest prediction {:.2f} mm", nearest * cell_mm)
                                              : std::string("no contact predicted");
-  throw ExecutionFailure(fmt::format("off the policy tree: {} after {:.2f} mm of {}, {} ({} hypotheses left)",
-                                     touch.contact ? "contact" : "no contact", touch.travelled * cell_mm,
-                                     ToString(touch.direction), expected, tracked_.size()));
+  throw LostTrack(fmt::format("off the policy tree: {} after {:.2f} mm of {}, {} ({} hypotheses left)",
+                              touch.contact ? "contact" : "no contact", touch.travelled * cell_mm,
+                              ToString(touch.direction), expected, tracked_.size()));
 }
 
 }  // namespace feeler::execution

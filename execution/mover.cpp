@@ -23,13 +23,14 @@ std::optional<Direction> DirectionOf(const Eigen::Vector3d& motion) {
   return MakeDirection(axis, motion[axis] < 0.0 ? -1 : 1);
 }
 
-Mover::Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record)
+Mover::Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
+             double started_s)
     : robot_(robot),
       frame_(frame),
       options_(options),
       record_(record),
-      start_time_s_(robot.Time()),
-      last_motion_end_s_(start_time_s_) {
+      start_time_s_(started_s),
+      last_motion_end_s_(robot.Time()) {
   position_ = Measure(robot.ToolPose());
 }
 
@@ -131,6 +132,17 @@ MotionReport Mover::Insert(const Eigen::Vector3d& target) {
   motion.speed_m_s = options_.insertion_speed_m_s;
   motion.force_limit_n = options_.insertion_force_limit_n;
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);
+}
+
+MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind) {
+  CheckLimits();
+  CompliantMotion motion;
+  for (const Eigen::Vector3d& place : way_points) motion.world_T_tool.push_back(frame_.ToWorld(place));
+  motion.speed_m_s = speed_m_s;
+  motion.force_limit_n = options_.insertion_force_limit_n;
+  const MotionReport report = Finish(robot_.Compliant(motion), way_points.back(), kind, {}, false);
+  position_ = report.end;  // what it is pressed against, not the command, says where it is
+  return report;
 }
 
 }  // namespace feeler::execution

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "core/robot.h"
 #include "execution/execution_record.h"
@@ -17,6 +18,13 @@ namespace feeler::execution {
 class ExecutionFailure : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// What was felt does not fit what the policy knows, or it knows no further: robot and episode are sound, and another
+/// plan may do better.
+class LostTrack : public ExecutionFailure {
+ public:
+  using ExecutionFailure::ExecutionFailure;
 };
 
 /// Where a motion ended, as measured, in lattice coordinates.
@@ -34,7 +42,9 @@ using PredictedCells = std::optional<std::array<double, 2>>;
 class Mover {
  public:
   /// All arguments outlive the mover.
-  Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record);
+  /// `started_s`: when the episode began, on the clock of the robot.
+  Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
+        double started_s);
 
   /// Where the tool was last sent, or found at contact.
   const Eigen::Vector3d& position() const { return position_; }
@@ -50,6 +60,8 @@ class Mover {
   void Retreat(const Eigen::Vector3d& target);
   /// Compliantly from here straight to `target`.
   MotionReport Insert(const Eigen::Vector3d& target);
+  /// Compliantly through way points, pressing on what is under the tool.
+  MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
   void ZeroWrench() { robot_.ZeroWrench(); }
 
  private:

@@ -39,6 +39,7 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
     scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
   }
   environment_ = std::make_unique<env::InsertionEnv>(std::move(scene));
+  online_planner_ = std::make_shared<execution::OnlinePlanner>();
 }
 
 EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
@@ -87,6 +88,8 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options = execution::ExecutorOptions::WithFriction();
       options.contact_force_n = reset.noise.contact_threshold_n;
     }
+    options.ladder = options_.ladder;
+    options.online_planner = online_planner_;
     if (options_.confirm_limit_m) options.confirm_limit_m = *options_.confirm_limit_m;
     record.execution =
         execution::Execute(task, problem, draw.world_T_estimate, *policy, environment_->robot(), options);

@@ -51,6 +51,7 @@ class EpisodeRunner {
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
   EpisodeNoise noise_;
+  std::shared_ptr<execution::OnlinePlanner> online_planner_;
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+
+#include "planner/belief/problem.h"
+#include "planner/solver/solve.h"
+#include "policies/policy.h"
+
+namespace feeler::execution {
+
+/// Plans for a belief that no database holds, while the robot waits: RTDP-Bel with a budget of expansions, so that the
+/// policy is the same wherever and whenever it is computed. The tables of a contact map are built at its first problem
+/// and shared by all that follow. Thread-safe.
+class OnlinePlanner {
+ public:
+  explicit OnlinePlanner(std::int64_t expansion_limit = 20000) : expansion_limit_(expansion_limit) {}
+
+  /// A policy for the problem; null if there is none within the budget.
+  std::unique_ptr<policies::Policy> PolicyFor(const planner::Problem& problem);
+
+ private:
+  std::shared_ptr<const planner::PlanningTables> TablesFor(const planner::Problem& problem,
+                                                           const planner::SolverOptions& options);
+
+  std::int64_t expansion_limit_;
+  std::mutex mutex_;  // guards all below
+  std::shared_ptr<const planner::ContactMap> map_;
+  CostWeights cost_;
+  GoalKind goal_ = GoalKind::kSingleton;
+  std::shared_ptr<const planner::PlanningTables> tables_;
+};
+
+}  // namespace feeler::execution
