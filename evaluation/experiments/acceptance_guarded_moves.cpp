@@ -59,8 +59,8 @@ class TrialMaker {
     trial.distance_m = cell_m * static_cast<double>(1 << random.Index(5));
     if (!IsClear(trial.start_m)) return std::nullopt;
     trial.free_m = Free(trial.start_m, trial.direction);
-    // Moves that end far from every wall teach nothing: one in eight is kept.
-    if (trial.free_m > trial.distance_m + cell_m && random.Index(8) != 0) return std::nullopt;
+    // Moves that end far from every wall teach nothing: one in sixty-four is kept.
+    if (trial.free_m > trial.distance_m + cell_m && random.Index(64) != 0) return std::nullopt;
     return trial;
   }
 
