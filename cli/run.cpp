@@ -123,7 +123,8 @@ void Run(const Flags& flags, Session& session) {
     if (out.is_open()) out << evaluation::ToJson(record).dump() << "\n" << std::flush;
   };
   ProgressBar bar("episodes");
-  workflow::RunEpisodes({0, flags.episodes}, jobs, make_runner, on_record, bar.Callback(), session.cancellation);
+  workflow::RunEpisodes(workflow::EpisodeRange(0, flags.episodes), jobs, make_runner, on_record, bar.Callback(),
+                        session.cancellation);
   bar.Finish();
   if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
 

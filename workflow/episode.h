@@ -55,15 +55,13 @@ class EpisodeRunner {
   std::unique_ptr<env::InsertionEnv> environment_;
 };
 
-/// Episodes first..end-1.
-struct EpisodeRange {
-  std::int64_t first = 0;
-  std::int64_t end = 0;
-};
+/// The numbers first..end-1.
+std::vector<std::int64_t> EpisodeRange(std::int64_t first, std::int64_t end);
 
-/// Runs episodes on several threads; hands the records to `on_record` in order of episode. Stops early, after the
-/// records finished so far, when cancelled. Returns how many were handed over. `progress` counts from episode 0.
-std::int64_t RunEpisodes(EpisodeRange range, Parallelism jobs, const std::function<EpisodeRunner()>& make_runner,
+/// Runs episodes on several threads; hands the records to `on_record` in the order of `episodes`. Stops early, after
+/// the records finished so far, when cancelled. Returns how many were handed over.
+std::int64_t RunEpisodes(const std::vector<std::int64_t>& episodes, Parallelism jobs,
+                         const std::function<EpisodeRunner()>& make_runner,
                          const std::function<void(const EpisodeRecord&)>& on_record, const ProgressCallback& progress,
                          const CancellationToken* cancellation);
 

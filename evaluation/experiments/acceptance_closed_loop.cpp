@@ -53,6 +53,7 @@ AcceptanceRow MakeRow(const Condition& condition, bool ladder, bool quick) {
     setting.extents = size;
     setting.noise = condition.noise;
     setting.ladder = ladder;
+    if (!ladder) setting.bare_of = fmt::format("{} with ladder {}", condition.name, size);
     setting.episodes = quick ? 4 : condition.episodes;
     row.settings.push_back(std::move(setting));
   }
@@ -66,7 +67,7 @@ std::string Percent(double rate) { return fmt::format("{:.2f}", 100.0 * rate); }
 std::vector<AcceptanceRow> AcceptanceClosedLoopRows(bool quick) {
   std::vector<AcceptanceRow> rows;
   for (const Condition& condition : kConditions) {
-    for (const bool ladder : {false, true}) rows.push_back(MakeRow(condition, ladder, quick));
+    for (const bool ladder : {true, false}) rows.push_back(MakeRow(condition, ladder, quick));
   }
   AcceptanceRow tight = MakeRow({"tight confirm", "plug", "ideal", "7x7x7", 0.0, 0.99, 300}, true, quick);
   for (EpisodeSetting& setting : tight.settings) setting.confirm_limit_m = kTightConfirmLimit_m;

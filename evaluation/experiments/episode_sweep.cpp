@@ -63,6 +63,7 @@ json ToJson(const EpisodeSetting& setting) {
           {"extents", setting.extents},
           {"noise", setting.noise},
           {"ladder", setting.ladder},
+          {"bare_of", setting.bare_of},
           {"confirm_limit_m", setting.confirm_limit_m ? json(*setting.confirm_limit_m) : json()},
           {"episodes", setting.episodes}};
 }
@@ -142,11 +143,18 @@ bool EpisodeSweep::Run() {
   return true;
 }
 
+struct EpisodeSweep::TaskWorld {
+  std::shared_ptr<const workflow::PlanningSetup> setup;
+  std::shared_ptr<const env::Scene> scene;
+  std::shared_ptr<policies::Database> database;
+};
+
 bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int64_t total) {
   workflow::PlanningSetupOptions setup_options;
   setup_options.jobs = request_.jobs;
   setup_options.progress = request_.map_progress;
-  const auto setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
+  TaskWorld world;
+  world.setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
 
   planner::ProblemFamily needed;
   std::set<std::string> seen;
@@ -155,44 +163,75 @@ bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int
     needed.problems.push_back(planner::ParseExtents(setting.extents));
     needed.spec += (needed.spec.empty() ? "" : ",") + setting.extents;
   }
-  workflow::RequireWithinTask(needed, setup->task());
+  workflow::RequireWithinTask(needed, world.setup->task());
   planner::PreprocessOptions build;
   build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   build.solver.gap = kGap;
   build.jobs = request_.jobs;
   build.cancellation = request_.cancellation;
-  const std::string database_file = request_.out + "/databases/" + setup->task().name + ".db";
-  if (workflow::BuildDatabase(*setup, needed, build, database_file).summary.cancelled) return false;
-  const auto database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(database_file));
+  const std::string database_file = request_.out + "/databases/" + world.setup->task().name + ".db";
+  if (workflow::BuildDatabase(*world.setup, needed, build, database_file).summary.cancelled) return false;
+  world.database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(database_file));
+  world.scene = workflow::BuildEpisodeScene(*world.setup);
 
-  const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
   for (const EpisodeSetting& setting : settings_) {
     if (setting.task != task) continue;
-    const std::string file = RecordsFile(setting);
-    const auto first = static_cast<std::int64_t>(ReadFinished(file, setting, request_.seed).size());
-    workflow::EpisodeOptions options;
-    options.seed = request_.seed;
-    options.family = {{planner::ParseExtents(setting.extents)}, setting.extents};
-    options.noise = setting.noise;
-    options.ladder = setting.ladder;
-    options.confirm_limit_m = setting.confirm_limit_m;
-    const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, database);
-    std::ofstream out(file, std::ios::app);
-    if (!out) throw InputError(file, "cannot be written", "choose another folder");
-    workflow::RunEpisodes(
-        {first, setting.episodes}, request_.jobs,
-        [&] { return workflow::EpisodeRunner(setup, scene, factory, options); },
-        [&](const workflow::EpisodeRecord& record) { out << ToJson(record).dump() << "\n"
-                                                         << std::flush; },
-        [&](std::int64_t episodes, std::int64_t) {
-          if (request_.progress) request_.progress(done + episodes, total);
-        },
-        request_.cancellation);
-    if (!out) throw InputError(file, "cannot be written", "check the free space");
-    if (request_.cancellation != nullptr && request_.cancellation->cancelled()) return false;
+    if (!RunSetting(world, setting, done, total)) return false;
     done += setting.episodes;
   }
   return true;
+}
+
+bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& setting, std::int64_t done,
+                              std::int64_t total) {
+  const std::string file = RecordsFile(setting);
+  const auto first = static_cast<std::int64_t>(ReadFinished(file, setting, request_.seed).size());
+  std::ofstream out(file, std::ios::app);
+  const auto require_written = [&] {
+    if (!out) throw InputError(file, "cannot be written", "check the folder and its free space");
+  };
+  require_written();
+
+  std::vector<json> with_ladder;
+  for (const EpisodeSetting& other : settings_) {
+    if (!setting.bare_of.empty() && other.name == setting.bare_of) with_ladder = Records(other);
+  }
+  // Writes what can be taken over up to the next episode that has to be run.
+  std::int64_t written = first;
+  const auto take_over = [&] {
+    for (; written < setting.episodes && written < static_cast<std::int64_t>(with_ladder.size()); ++written) {
+      const json& record = with_ladder[static_cast<std::size_t>(written)];
+      if (!record.at("ladder").empty()) return;
+      out << record.dump() << "\n";
+    }
+  };
+  std::vector<std::int64_t> episodes;
+  for (const std::int64_t episode : workflow::EpisodeRange(first, setting.episodes)) {
+    const auto index = static_cast<std::size_t>(episode);
+    if (index >= with_ladder.size() || !with_ladder[index].at("ladder").empty()) episodes.push_back(episode);
+  }
+
+  workflow::EpisodeOptions options;
+  options.seed = request_.seed;
+  options.family = {{planner::ParseExtents(setting.extents)}, setting.extents};
+  options.noise = setting.noise;
+  options.ladder = setting.ladder;
+  options.confirm_limit_m = setting.confirm_limit_m;
+  const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, world.database);
+  take_over();
+  workflow::RunEpisodes(
+      episodes, request_.jobs, [&] { return workflow::EpisodeRunner(world.setup, world.scene, factory, options); },
+      [&](const workflow::EpisodeRecord& record) {
+        out << ToJson(record).dump() << "\n";
+        ++written;
+        take_over();
+        out.flush();
+        if (request_.progress) request_.progress(done + written, total);
+      },
+      {}, request_.cancellation);
+  out.flush();
+  require_written();
+  return request_.cancellation == nullptr || !request_.cancellation->cancelled();
 }
 
 std::vector<json> EpisodeSweep::Records(const EpisodeSetting& setting) const {

@@ -19,6 +19,9 @@ struct EpisodeSetting {
   std::string extents;  ///< the problem that every episode has, e.g. "7x7x7"
   std::string noise = "ideal";
   bool ladder = true;
+  /// Name of an earlier setting that differs in `ladder = true` alone: an episode in which it used no fallback is the
+  /// same without the ladder (tests/evaluation/episode_sweep_test.cpp) and is taken over, the others are run.
+  std::string bare_of;
   std::optional<double> confirm_limit_m;  ///< default: the executor's
   std::int64_t episodes = 300;
 };
@@ -64,7 +67,9 @@ class EpisodeSweep {
 
  private:
   std::string RecordsFile(const EpisodeSetting& setting) const;
+  struct TaskWorld;
   bool RunTask(const std::string& task, std::int64_t& done, std::int64_t total);
+  bool RunSetting(const TaskWorld& world, const EpisodeSetting& setting, std::int64_t done, std::int64_t total);
 
   std::string experiment_;
   std::vector<EpisodeSetting> settings_;

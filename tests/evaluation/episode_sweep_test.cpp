@@ -119,6 +119,31 @@ TEST_F(EpisodeSweepTest, AnInterruptedSweepGoesOn) {
   EXPECT_THROW(EpisodeSweep("sweep", {other}, request).Run(), InputError);
 }
 
+TEST_F(EpisodeSweepTest, WhatNeededNoFallbackIsTheSameWithoutTheLadder) {
+  EpisodeSetting with_ladder = setting_;
+  with_ladder.name = "with ladder";
+  with_ladder.noise = "outside";
+  EpisodeSetting taken_over = with_ladder;
+  taken_over.name = "bare, taken over";
+  taken_over.ladder = false;
+  taken_over.bare_of = with_ladder.name;
+  EpisodeSetting run = taken_over;
+  run.name = "bare, run";
+  run.bare_of.clear();
+  EpisodeSetting easy = setting_;
+  EpisodeSetting easy_bare = easy;
+  easy_bare.name = "small bare";
+  easy_bare.ladder = false;
+  const ExperimentRequest request = Request(Folder("bare"));
+  EpisodeSweep sweep("sweep", {with_ladder, taken_over, run, easy, easy_bare}, request);
+  ASSERT_TRUE(sweep.Run());
+  EXPECT_GT(StatisticsOf(sweep.Records(with_ladder)).ladder_used.successes, 0);
+  EXPECT_EQ(WithoutTiming(sweep.Records(taken_over)), WithoutTiming(sweep.Records(run)));
+  EXPECT_EQ(StatisticsOf(sweep.Records(run)).ladder_used.successes, 0);
+  EXPECT_EQ(StatisticsOf(sweep.Records(easy)).ladder_used.successes, 0);
+  EXPECT_EQ(WithoutTiming(sweep.Records(easy)), WithoutTiming(sweep.Records(easy_bare)));
+}
+
 TEST_F(EpisodeSweepTest, UnknownNoiseIsRefusedBeforeTheFirstEpisode) {
   const ExperimentRequest request = Request(Folder("noise"));
   EpisodeSetting unknown = setting_;
