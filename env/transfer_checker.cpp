@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/error.h"
 
@@ -31,6 +32,29 @@ JointVector Reach(const Scene& scene) {
     }
   }
   return reach;
+}
+
+planner::JointBounds JointLimits(const Scene& scene) {
+  planner::JointBounds limits{JointVector::Zero(), JointVector::Zero()};
+  for (int i = 0; i < kJointCount; ++i) {
+    const double* range = scene.model->jnt_range + 2 * scene.joint[static_cast<std::size_t>(i)];
+    limits.lower_rad[i] = range[0];
+    limits.upper_rad[i] = range[1];
+  }
+  return limits;
+}
+
+/// The same place of all links, each joint as near to `start` as whole turns and its limits allow.
+Eigen::VectorXd NearestTwin(const Eigen::VectorXd& q, const JointVector& start, const planner::JointBounds& limits) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  Eigen::VectorXd twin = q;
+  for (int i = 0; i < kJointCount; ++i) {
+    for (const double other : {q[i] - kTurn, q[i] + kTurn}) {
+      const bool allowed = other >= limits.lower_rad[i] && other <= limits.upper_rad[i];
+      if (allowed && std::abs(other - start[i]) < std::abs(twin[i] - start[i])) twin[i] = other;
+    }
+  }
+  return twin;
 }
 
 std::string BodyOfGeom(const mjModel& model, int geom) {
@@ -93,14 +117,27 @@ planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene,
   options.reach_m = checker.reach_m();
   // Half the spacing stays within the clearance, and so does half of it again for rounded corners.
   options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
+  const planner::JointBounds limits = JointLimits(scene);
   planner::JointBounds bounds;
-  bounds.lower_rad = JointVector::Constant(-settings.joint_bound_rad);
-  bounds.upper_rad = JointVector::Constant(settings.joint_bound_rad);
-  const planner::TransferPlanner planner(
-      bounds, [&](const Eigen::VectorXd& q) { return checker.Free(q); }, options);
+  const JointVector near = JointVector::Constant(settings.joint_bound_rad);
+  bounds.lower_rad = JointVector(-near).cwiseMin(start_rad).cwiseMax(limits.lower_rad);
+  bounds.upper_rad = near.cwiseMax(start_rad).cwiseMin(limits.upper_rad);
+  const planner::ValidityFunction free = [&](const Eigen::VectorXd& q) { return checker.Free(q); };
+  const planner::TransferPlanner planner(bounds, free, options);
   std::vector<Eigen::VectorXd> goals;
   for (const JointVector& q : ToolInverseKinematics(scene, world_T_tool)) goals.emplace_back(q);
   planner::TransferPlan plan = planner.Plan(start_rad, goals);
+  if (plan.status == planner::TransferStatus::kNotFound && settings.far_iterations > 0) {
+    const int branches = static_cast<int>(goals.size());
+    for (int i = 0; i < branches; ++i) {
+      goals.push_back(NearestTwin(goals[static_cast<std::size_t>(i)], start_rad, limits));
+    }
+    options.iterations_all_goals = settings.far_iterations;
+    const int checks = plan.checks;
+    plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
+    plan.checks += checks;
+    if (plan.goal >= branches) plan.goal -= branches;
+  }
   if (plan.status == planner::TransferStatus::kStartInvalid && planner.WithinBounds(start_rad)) {
     plan.reason += ": " + checker.Collision(start_rad);
   } else if (plan.status == planner::TransferStatus::kNoGoal && !goals.empty()) {

@@ -48,12 +48,16 @@ class TransferChecker {
 struct TransferSettings {
   double clearance_m = 0.004;
   std::uint64_t seed = 0;
-  /// Joints stay within this of zero; the joints' own limits are wider, but then every configuration has twins.
+  /// Joints stay within this of zero at first (and of where they are): their own limits are wider, but then every
+  /// configuration has twins and the search more room to get lost in. Where no way is found, the limits of the joints
+  /// count.
   double joint_bound_rad = 3.14159265358979323846;
+  int far_iterations = 20000;       ///< effort of the search within the limits of the joints; 0: none
   planner::TransferOptions search;  ///< seed, reach_m and check_spacing_m are set from the above
 };
 
-/// Plans a transfer of the tool to `world_T_tool`: all branches of the inverse kinematics are goals.
+/// Plans a transfer of the tool to `world_T_tool`: all branches of the inverse kinematics are goals, and, where the
+/// limits of the joints count, their twins a turn of some joints away that are nearest to the start.
 /// Way points, where there are any, begin with `start_rad` and are straight in joint space.
 planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
                                    const Pose& world_T_tool, const TransferSettings& settings = {});

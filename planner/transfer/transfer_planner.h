@@ -27,8 +27,8 @@ struct TransferOptions {
   /// <= 2 c makes a plan free of collision everywhere, not only where it was checked.
   double check_spacing_m = 0.005;
   double extension_m = 1.0;         ///< largest sweep of one branch of a search tree
-  int iterations_per_goal = 300;    ///< search effort per goal in turn, nearest goals first
-  int iterations_all_goals = 5000;  ///< and for all goals together, where no goal was reached in turn
+  int iterations_per_goal = 0;      ///< search effort per goal in turn, nearest goals first; it rarely pays
+  int iterations_all_goals = 1500;  ///< for all goals together, where no goal was reached in turn
   int plans_to_compare = 2;         ///< stop after this many goals were reached; the shortest plan wins
   int simplification_rounds = 4;    ///< of removing and short-cutting way points
 };

@@ -43,7 +43,7 @@ class TransferScene : public testing::TestWithParam<const char*> {
       for (int k = 0; k <= steps; ++k) {
         const JointVector q = plan.way_points[i - 1] + static_cast<double>(k) / steps * way;
         ASSERT_FALSE(Touches(q)) << "piece " << i << ", step " << k;
-        ASSERT_LE(q.cwiseAbs().maxCoeff(), std::numbers::pi);
+        ASSERT_LE(q.cwiseAbs().maxCoeff(), 2.0 * std::numbers::pi);
       }
     }
     const planner::MotionLimits limits{0.5 * scene_->velocity_limit_rad_s, JointVector::Constant(5.0)};
