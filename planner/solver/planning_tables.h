@@ -9,6 +9,7 @@
 #include "planner/heuristic/first_contact.h"
 #include "planner/heuristic/lines.h"
 #include "planner/heuristic/local_certificate.h"
+#include "planner/heuristic/open_bound.h"
 #include "planner/heuristic/pair_certificates.h"
 #include "planner/solver/solve.h"
 
@@ -27,6 +28,7 @@ class PlanningTables {
   struct Filled {
     std::shared_ptr<const ContactMap> map;
     std::shared_ptr<const PlanningTables> tables;
+    std::shared_ptr<const OpenBound> bound;  ///< null without a table of certificates
   };
   const Filled& filled() const;
 
