@@ -28,7 +28,7 @@ constexpr std::uint32_t kGreedyBesideOpen = 256;
 
 /// epsilon * heur, times the weight of the belief.
 struct InflatedHeuristic {
-  const BeliefGraph *graph = nullptr;
+  const BeliefGraph* graph = nullptr;
   double epsilon = 1.0;
   double operator()(BeliefId b) const { return epsilon * graph->Heuristic(b); }
 };
@@ -36,12 +36,14 @@ struct InflatedHeuristic {
 /// One attempt at a problem: the belief graph, the clocks, and what every
 /// solver does with them.
 class Attempt {
-public:
-  Attempt(const Problem &problem, const SolverOptions &options,
-          const PlanningTables &tables, const Experience &experience,
-          bool canonical)
-      : options_(options), experience_(experience), tables_(tables),
-        watch_(options), graph_(problem, tables.masks(), canonical) {
+ public:
+  Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+          const Experience& experience, bool canonical)
+      : options_(options),
+        experience_(experience),
+        tables_(tables),
+        watch_(options),
+        graph_(problem, tables.masks(), canonical) {
     heuristic_ = tables.MakeHeuristic(problem, graph_.sets());
     graph_.SetHeuristic(heuristic_.get());
     result_.expected_cost = kInfinity;
@@ -50,62 +52,47 @@ public:
   SolverResult Run() {
     start_ = graph_.Start();
     if (start_ == kNoBelief) {
-      result_.policy =
-          FreezePolicy(graph_, [](BeliefId) { return GuardedMove(); });
+      result_.policy = FreezePolicy(graph_, [](BeliefId) { return GuardedMove(); });
     } else {
       weight_ = graph_.Weight(start_);
       switch (options_.solver) {
-      case SolverKind::kCertified:
-        RunCertified();
-        break;
-      case SolverKind::kRtdpBel:
-        RunRtdpBel(Inflated(options_.epsilon));
-        break;
-      case SolverKind::kERtdpBel:
-        RunERtdpBel();
-        break;
+        case SolverKind::kCertified: RunCertified(); break;
+        case SolverKind::kRtdpBel: RunRtdpBel(Inflated(options_.epsilon)); break;
+        case SolverKind::kERtdpBel: RunERtdpBel(); break;
       }
     }
     Finish();
     return std::move(result_);
   }
 
-private:
-  InflatedHeuristic Inflated(double epsilon) const {
-    return {&graph_, epsilon};
-  }
+ private:
+  InflatedHeuristic Inflated(double epsilon) const { return {&graph_, epsilon}; }
 
   std::optional<SolverStatus> Stop(std::int64_t expansions) {
-    if (graph_.bytes() + heuristic_->bytes() > options_.memory_limit_bytes)
-      return SolverStatus::kExpansionLimit;
+    if (graph_.bytes() + heuristic_->bytes() > options_.memory_limit_bytes) return SolverStatus::kExpansionLimit;
     return watch_.Stop(expansions);
   }
 
   /// RTDP-Bel with heur^E in place of epsilon * heur.
   void RunERtdpBel() {
-    if (experience_.kind == ExperienceKind::kNone ||
-        experience_.policy == nullptr) {
+    if (experience_.kind == ExperienceKind::kNone || experience_.policy == nullptr) {
       return RunRtdpBel(Inflated(options_.epsilon));
     }
-    ExperienceMdp mdp =
-        experience_.kind == ExperienceKind::kRollout
-            ? RollOut(graph_, *experience_.policy)
-            : Transplant(graph_, *experience_.problem, *experience_.policy);
-    ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon,
-                                  options_.jumps);
+    ExperienceMdp mdp = experience_.kind == ExperienceKind::kRollout
+                            ? RollOut(graph_, *experience_.policy)
+                            : Transplant(graph_, *experience_.problem, *experience_.policy);
+    ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon, options_.jumps);
     RunRtdpBel([&](BeliefId b) { return graph_.Weight(b) * heuristic(b); });
   }
 
-  template <class Initial> void RunRtdpBel(Initial initial) {
+  template <class Initial>
+  void RunRtdpBel(Initial initial) {
     RtdpBel search(graph_, initial, options_.seed);
     const auto lower = [&] {
-      return std::max(search.Lower(start_),
-                      search.Value(start_) / options_.epsilon) /
-             weight_;
+      return std::max(search.Lower(start_), search.Value(start_) / options_.epsilon) / weight_;
     };
     const auto why = search.Run(start_, [&](std::int64_t expansions) {
-      if (watch_.RowDue())
-        Row(search.trials(), expansions, lower(), kInfinity);
+      if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
       return Stop(expansions);
     });
     result_.lower_bound = lower();
@@ -123,118 +110,96 @@ private:
   void RunCertified() {
     result_.lower_bound = graph_.Heuristic(start_) / weight_;
     if (graph_.problem().generous_workspace && tables_.filled().bound) {
-      const double bound = tables_.filled().bound->Weighted(
-          graph_.sets(), graph_.set(start_), graph_.robot(start_));
+      const double bound = tables_.filled().bound->Weighted(graph_.sets(), graph_.set(start_), graph_.robot(start_));
       result_.lower_bound = std::max(result_.lower_bound, bound / weight_);
     }
     GreedyCompletion greedy(graph_);
     if (const std::optional<Problem> filled = WithoutDeadEnds()) {
       // Dead ends make beliefs many and the greedy choice short-sighted (it
       // looks into them one by one).
-      BeliefGraph filled_graph(*filled, tables_.filled().tables->masks(),
-                               graph_.canonical());
-      const auto heuristic =
-          tables_.filled().tables->MakeHeuristic(*filled, filled_graph.sets());
+      BeliefGraph filled_graph(*filled, tables_.filled().tables->masks(), graph_.canonical());
+      const auto heuristic = tables_.filled().tables->MakeHeuristic(*filled, filled_graph.sets());
       filled_graph.SetHeuristic(heuristic.get());
       OpenPolicy open(graph_, filled_graph, *tables_.filled().bound, greedy);
       open.Run(start_);
-      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideOpen ||
-          !open.Solved(start_))
-        Complete(greedy);
-      if (open.Solved(start_))
-        CloseGap(open, 0);
+      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideOpen || !open.Solved(start_)) Complete(greedy);
+      if (open.Solved(start_)) CloseGap(open, 0);
     } else if (Complete(greedy)) {
       CloseGap(greedy, 0);
     }
   }
 
   /// False, and says so in the result, if some hypotheses cannot be told apart.
-  bool Complete(GreedyCompletion<BeliefGraph> &greedy) {
-    if (!greedy.Run(start_,
-                    [](std::int64_t) { return std::optional<SolverStatus>(); }))
-      return true;
+  bool Complete(GreedyCompletion<BeliefGraph>& greedy) {
+    if (!greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); })) return true;
     result_.status = SolverStatus::kUnlocalizable;
     result_.expansions = greedy.expansions();
     result_.lower_bound = kInfinity;
-    result_.indistinguishable =
-        IndistinguishablePairs(graph_.problem(), tables_.masks());
+    result_.indistinguishable = IndistinguishablePairs(graph_.problem(), tables_.masks());
     return false;
   }
 
   /// The problem on the map whose dead ends are filled; none where there are
   /// none, or the tool is in one.
   std::optional<Problem> WithoutDeadEnds() {
-    const Problem &problem = graph_.problem();
-    if (!problem.generous_workspace || !tables_.filled().bound)
-      return std::nullopt;
+    const Problem& problem = graph_.problem();
+    if (!problem.generous_workspace || !tables_.filled().bound) return std::nullopt;
     Problem without = problem;
     without.map = tables_.filled().map;
-    for (const Hypothesis &h : problem.hypotheses) {
-      if (Blocked(without, problem.start, h))
-        return std::nullopt;
+    for (const Hypothesis& h : problem.hypotheses) {
+      if (Blocked(without, problem.start, h)) return std::nullopt;
     }
     return without;
   }
 
   template <class Incumbent>
-  void CloseGap(Incumbent &incumbent, std::int64_t expansions_before) {
+  void CloseGap(Incumbent& incumbent, std::int64_t expansions_before) {
     BoundedSearch search(graph_, incumbent, options_.gap);
-    const auto lower = [&] {
-      return std::max(result_.lower_bound, search.Lower(start_) / weight_);
-    };
-    const auto why = search.Run(
-        start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
-          const double upper = search.Upper(start_) / weight_;
-          if (watch_.RowDue())
-            Row(result_.trials + search.trials(), searched + expansions_before,
-                lower(), upper);
-          if (upper <= options_.gap * lower())
-            return SolverStatus::kGap;
-          return Stop(searched + expansions_before);
-        });
+    const auto lower = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
+    const auto why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
+      const double upper = search.Upper(start_) / weight_;
+      if (watch_.RowDue()) Row(result_.trials + search.trials(), searched + expansions_before, lower(), upper);
+      if (upper <= options_.gap * lower()) return SolverStatus::kGap;
+      return Stop(searched + expansions_before);
+    });
     result_.lower_bound = lower();
     result_.trials += search.trials();
     result_.expansions = search.expansions() + expansions_before;
     result_.status = why.value_or(SolverStatus::kGap);
     result_.policy = Freeze(search);
-    if (result_.policy->expected_cost <=
-        result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
+    if (result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
       result_.status = SolverStatus::kConverged;
     }
   }
 
   /// The policy that a search found, with as few moves as its cost allows.
-  template <class Search> Policy Freeze(Search &search) {
+  template <class Search>
+  Policy Freeze(Search& search) {
     const MoveMap moves = FewestMoves(graph_, [&](BeliefId b) {
-      const BeliefAction &action =
-          graph_.Actions(b)[static_cast<std::size_t>(search.Action(b))];
+      const BeliefAction& action = graph_.Actions(b)[static_cast<std::size_t>(search.Action(b))];
       return GuardedMove{action.direction, action.cells};
     });
     return FreezePolicy(graph_, [&](BeliefId b) { return moves.at(b); });
   }
 
-  void Row(std::int64_t trials, std::int64_t expansions, double lower,
-           double upper) {
+  void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) {
     options_.on_bounds({watch_.wall_s(), trials, expansions, lower, upper});
   }
 
   void Finish() {
     if (result_.policy) {
       result_.expected_cost = result_.policy->expected_cost;
-      result_.lower_bound =
-          std::min(result_.lower_bound, result_.expected_cost); // rounding
+      result_.lower_bound = std::min(result_.lower_bound, result_.expected_cost);  // rounding
       result_.policy->lower_bound = result_.lower_bound;
     }
-    if (options_.on_bounds)
-      Row(result_.trials, result_.expansions, result_.lower_bound,
-          result_.expected_cost);
+    if (options_.on_bounds) Row(result_.trials, result_.expansions, result_.lower_bound, result_.expected_cost);
     result_.wall_s = watch_.wall_s();
     result_.cpu_s = watch_.cpu_s();
   }
 
-  const SolverOptions &options_;
-  const Experience &experience_;
-  const PlanningTables &tables_;
+  const SolverOptions& options_;
+  const Experience& experience_;
+  const PlanningTables& tables_;
   StopWatch watch_;
   BeliefGraph graph_;
   std::unique_ptr<BeliefHeuristic> heuristic_;
@@ -243,62 +208,45 @@ private:
   SolverResult result_;
 };
 
-} // namespace
+}  // namespace
 
 std::string_view ToString(SolverStatus status) {
   switch (status) {
-  case SolverStatus::kConverged:
-    return "converged";
-  case SolverStatus::kGap:
-    return "gap";
-  case SolverStatus::kTimeLimit:
-    return "time_limit";
-  case SolverStatus::kExpansionLimit:
-    return "expansion_limit";
-  case SolverStatus::kCancelled:
-    return "cancelled";
-  case SolverStatus::kUnlocalizable:
-    return "unlocalizable";
+    case SolverStatus::kConverged: return "converged";
+    case SolverStatus::kGap: return "gap";
+    case SolverStatus::kTimeLimit: return "time_limit";
+    case SolverStatus::kExpansionLimit: return "expansion_limit";
+    case SolverStatus::kCancelled: return "cancelled";
+    case SolverStatus::kUnlocalizable: return "unlocalizable";
   }
   return "?";
 }
 
 std::string_view ToString(ExperienceKind kind) {
   switch (kind) {
-  case ExperienceKind::kRollout:
-    return "rollout";
-  case ExperienceKind::kNaive:
-    return "naive";
-  case ExperienceKind::kNone:
-    return "none";
+    case ExperienceKind::kRollout: return "rollout";
+    case ExperienceKind::kNaive: return "naive";
+    case ExperienceKind::kNone: return "none";
   }
   return "?";
 }
 
 double SolverResult::Ratio() const {
-  if (!policy)
-    return kInfinity;
-  if (lower_bound > 0.0)
-    return expected_cost / lower_bound;
+  if (!policy) return kInfinity;
+  if (lower_bound > 0.0) return expected_cost / lower_bound;
   return expected_cost > 0.0 ? kInfinity : 1.0;
 }
 
-SolverResult Solve(const Problem &problem, const SolverOptions &options,
-                   std::shared_ptr<const PlanningTables> tables,
-                   const Experience &experience) {
+SolverResult Solve(const Problem& problem, const SolverOptions& options, std::shared_ptr<const PlanningTables> tables,
+                   const Experience& experience) {
   Validate(problem);
   Validate(options);
-  if (experience.kind == ExperienceKind::kNaive &&
-      experience.policy != nullptr && experience.problem == nullptr) {
-    throw InputError(
-        "experience",
-        "a naive experience needs the problem its policy was made for");
+  if (experience.kind == ExperienceKind::kNaive && experience.policy != nullptr && experience.problem == nullptr) {
+    throw InputError("experience", "a naive experience needs the problem its policy was made for");
   }
-  if (!tables)
-    tables = BuildPlanningTables(problem, options);
-  const bool canonical = options.canonical_translation &&
-                         problem.generous_workspace &&
-                         options.solver != SolverKind::kERtdpBel;
+  if (!tables) tables = BuildPlanningTables(problem, options);
+  const bool canonical =
+      options.canonical_translation && problem.generous_workspace && options.solver != SolverKind::kERtdpBel;
   if (!problem.generous_workspace) {
     SolverResult result;
     result.indistinguishable = IndistinguishablePairs(problem, tables->masks());
@@ -309,13 +257,11 @@ SolverResult Solve(const Problem &problem, const SolverOptions &options,
       return result;
     }
   }
-  SolverResult result =
-      Attempt(problem, options, *tables, experience, canonical).Run();
-  if (canonical && result.policy &&
-      !StaysInWorkspace(problem, *result.policy)) {
+  SolverResult result = Attempt(problem, options, *tables, experience, canonical).Run();
+  if (canonical && result.policy && !StaysInWorkspace(problem, *result.policy)) {
     result = Attempt(problem, options, *tables, experience, false).Run();
   }
   return result;
 }
 
-} // namespace feeler::planner
+}  // namespace feeler::planner
