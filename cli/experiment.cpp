@@ -19,7 +19,9 @@ struct Flags {
   std::string out;
   bool list = false;
   bool quick = false;
+  std::string task;
   std::int64_t seed = 1;
+  int solver_seeds = 0;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
@@ -47,8 +49,12 @@ void Run(const Flags& flags, Session& session) {
   request.quick = flags.quick;
   request.jobs = ParseJobs(flags.jobs);
   request.seed = ParseSeed(flags.seed);
-  request.command = fmt::format("feeler experiment {} --out {}{} --seed {} --jobs {}", flags.name, flags.out,
-                                flags.quick ? " --quick" : "", flags.seed, request.jobs.threads());
+  request.task = flags.task;
+  request.solver_seeds = flags.solver_seeds;
+  request.command = fmt::format("feeler experiment {} --out {}{}{}{} --seed {} --jobs {}", flags.name, flags.out,
+                                flags.quick ? " --quick" : "", flags.task.empty() ? "" : " --task " + flags.task,
+                                flags.solver_seeds > 0 ? fmt::format(" --solver-seeds {}", flags.solver_seeds) : "",
+                                flags.seed, request.jobs.threads());
   request.cancellation = session.cancellation;
   request.map_progress = map_bar.Callback();
   request.progress = bar.Callback();
@@ -76,6 +82,12 @@ void AddExperimentCommand(CLI::App& app, Session& session) {
                       "folder for NAME.csv, NAME.json and manifest.json; an interrupted run in it "
                       "is continued");
   command->add_flag("--quick", flags->quick, "few problems and short limits: a minute or two on two cores");
+  command->add_option("--task", flags->task,
+                      "name under models/tasks/, or path of a task file, for the experiments on planning (default: "
+                      "plug)");
+  command->add_option("--solver-seeds", flags->solver_seeds,
+                      "repetitions of each attempt of a table (default: 3; 1 with --quick); more may be added to a "
+                      "finished folder");
   command->add_option("--seed", flags->seed, "of the sample and the first of the solver seeds")->capture_default_str();
   command->add_option("--jobs", flags->jobs, "threads; more than the cores would spoil the measured times")
       ->capture_default_str();

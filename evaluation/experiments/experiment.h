@@ -17,7 +17,9 @@ struct ExperimentRequest {
   std::string out;     ///< folder, created if missing
   bool quick = false;  ///< few problems and short limits
   Parallelism jobs;
+  std::string task;                                 ///< instead of the experiment's own, where it takes one
   std::uint64_t seed = 1;                           ///< of samples; solver seeds count up from it
+  int solver_seeds = 0;                             ///< repetitions, where the experiment takes them; 0: its own number
   std::string command;                              ///< for the manifest
   const CancellationToken* cancellation = nullptr;  ///< may be null
   ProgressCallback map_progress;                    ///< while a contact map is built
@@ -39,6 +41,8 @@ struct Experiment {
   std::string name;
   std::string summary;
   std::function<ExperimentResult(const ExperimentRequest&)> run;
+  bool takes_task = false;          ///< follows ExperimentRequest::task
+  bool takes_solver_seeds = false;  ///< follows ExperimentRequest::solver_seeds
 };
 
 /// Where the finished cells of an experiment are kept: OUT/NAME.partial.jsonl.

@@ -23,10 +23,11 @@ const std::vector<Experiment>& Experiments() {
       {kAcceptanceGuardedMovesName, "guarded moves in physics against geometry", RunAcceptanceGuardedMoves},
       {kAcceptanceTransfersName, "transfers among obstacles in four scenes: planned, and carried out in physics",
        RunAcceptanceTransfers},
-      {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds},
-      {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug},
+      {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds, true},
+      {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
+       true},
       {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",
-       RunTable3Ablation},
+       RunTable3Ablation, true, true},
   };
   return kExperiments;
 }
@@ -45,6 +46,13 @@ const Experiment& FindExperiment(const std::string& name) {
 }
 
 ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRequest& request) {
+  if (!request.task.empty() && !experiment.takes_task) {
+    throw InputError("--task", "experiment " + experiment.name + " has its own", "leave it out");
+  }
+  if (request.solver_seeds < 0 || (request.solver_seeds > 0 && !experiment.takes_solver_seeds)) {
+    throw InputError("--solver-seeds", request.solver_seeds < 0 ? "negative" : "not used by " + experiment.name,
+                     "leave it out");
+  }
   std::error_code error;
   std::filesystem::create_directories(request.out, error);
   if (error) throw InputError(request.out, "cannot be created: " + error.message(), "choose another folder");

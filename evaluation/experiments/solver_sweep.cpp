@@ -7,6 +7,8 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "planner/belief/belief_graph.h"
+#include "planner/solver/planning_tables.h"
 #include "policies/formats/policy_blob.h"
 
 namespace feeler::evaluation {
@@ -69,7 +71,7 @@ planner::ProblemFamily DrawSample(const planner::ProblemFamily& family, int stra
 }
 
 nlohmann::json ToJson(const SolverRow& row) {
-  const planner::SolverOptions& options = row.options;
+  const planner::SolverOptions options = planner::WithFamilyBudget(row.options);  // what is used
   nlohmann::json json = {
       {"label", row.label},
       {"setting", row.setting},
@@ -77,6 +79,7 @@ nlohmann::json ToJson(const SolverRow& row) {
       {"heuristic", planner::ToString(options.heuristic)},
       {"canonical_translation", options.canonical_translation},
       {"time_limit_s", LimitJson(options.time_limit_s)},
+      {"cpu_limit_s", LimitJson(options.cpu_limit_s)},
       {"memory_limit_bytes", options.memory_limit_bytes},
   };
   if (options.expansion_limit != std::numeric_limits<std::int64_t>::max()) {
@@ -89,6 +92,7 @@ nlohmann::json ToJson(const SolverRow& row) {
   }
   if (options.solver == planner::SolverKind::kERtdpBel) {
     json["experience"] = planner::ToString(row.experience);
+    json["jumps"] = planner::ToString(options.jumps);
     json["order"] = row.order == planner::ProblemOrder::kUncertainty ? "uncertainty" : "random";
   }
   return json;
@@ -99,7 +103,10 @@ class SolverSweep::Sink : public planner::PolicySink {
  public:
   Sink(const SolverSweep& sweep, const SolverRow& row, std::uint64_t seed) : sweep_(sweep), row_(row), seed_(seed) {}
 
-  bool Done(const planner::Extents& extents) override { return Find(extents) != nullptr; }
+  /// A row whose policies are not kept is measured whole or not at all.
+  bool Done(const planner::Extents& extents) override {
+    return (sweep_.context_.keep_policies || !NeedsPolicies()) && Find(extents) != nullptr;
+  }
 
   std::optional<planner::Policy> Load(const planner::Extents& extents) override {
     const nlohmann::json* cell = Find(extents);
@@ -111,16 +118,18 @@ class SolverSweep::Sink : public planner::PolicySink {
   void Store(const planner::Extents& extents, const planner::Problem& /*problem*/,
              const planner::SolverResult& result) override {
     nlohmann::json cell = ToJson(RecordOf(result));
-    if (row_.options.solver == planner::SolverKind::kERtdpBel && result.complete()) {
+    if (sweep_.context_.keep_policies && NeedsPolicies() && result.complete()) {
       cell["policy"] = ToHex(policies::EncodePolicyBlob(*result.policy));
     }
     sweep_.context_.cells->Put(sweep_.CellOf(row_, seed_, extents), std::move(cell));
   }
 
- private:
   const nlohmann::json* Find(const planner::Extents& extents) const {
     return sweep_.context_.cells->Find(sweep_.CellOf(row_, seed_, extents));
   }
+
+ private:
+  bool NeedsPolicies() const { return row_.options.solver == planner::SolverKind::kERtdpBel; }
 
   const SolverSweep& sweep_;
   const SolverRow& row_;
@@ -155,7 +164,7 @@ bool SolverSweep::Run() {
     for (const SolverRow& row : rows_) {
       Sink sink(*this, row, seed);
       const bool finished = std::all_of(sample_.problems.begin(), sample_.problems.end(),
-                                        [&](const planner::Extents& extents) { return sink.Done(extents); });
+                                        [&](const planner::Extents& extents) { return sink.Find(extents) != nullptr; });
       if (!finished) {
         planner::PreprocessOptions options;
         options.solver = row.options;
@@ -186,6 +195,20 @@ std::vector<SolveRecord> SolverSweep::Records(std::size_t row) const {
     }
   }
   return records;
+}
+
+std::vector<double> SolverSweep::StartHeuristics(std::size_t row) {
+  const auto tables = TablesFor(rows_[row].options);
+  std::vector<double> values;
+  for (const planner::Extents& extents : sample_.problems) {
+    const planner::Problem problem = planner::MakeCuboidProblem(case_.task, case_.map, extents);
+    planner::BeliefGraph graph(problem, tables->masks(), false);
+    const auto heuristic = tables->MakeHeuristic(problem, graph.sets());
+    graph.SetHeuristic(heuristic.get());
+    const planner::BeliefId start = graph.Start();
+    values.push_back(start == planner::kNoBelief ? 0.0 : graph.Heuristic(start) / graph.Weight(start));
+  }
+  return values;
 }
 
 nlohmann::json SolverSweep::RecordsJson() const {

@@ -43,6 +43,9 @@ struct SweepContext {
   Parallelism jobs;
   const CancellationToken* cancellation = nullptr;  ///< may be null
   ProgressCallback progress;                        ///< cells done, of all
+  /// Keep policies that may serve as experience with the cells. Without, a row of E-RTDP-Bel that was interrupted is
+  /// run again from its first problem: right for whole families, whose policies would fill gigabytes.
+  bool keep_policies = true;
 };
 
 /// Runs rows over a sample, seed by seed, by Algorithm 3 (planner::Preprocess): E-RTDP-Bel takes the most similar
@@ -59,6 +62,8 @@ class SolverSweep {
   const std::vector<SolverRow>& rows() const { return rows_; }
   /// The attempts of a row, seed by seed, problem by problem in the order of the sample. After Run returned true.
   std::vector<SolveRecord> Records(std::size_t row) const;
+  /// heur(b_start) of each problem of the sample under the heuristic of a row.
+  std::vector<double> StartHeuristics(std::size_t row);
   /// Every attempt, for the details of a result.
   nlohmann::json RecordsJson() const;
 

@@ -19,11 +19,15 @@ DatabaseTable Table1Plug() {
   table.rows.push_back(FastCertifiedRow());
   table.base = 0;
   table.reference = table.rows.size() - 1;
+  table.family_rows = {OverFamily(FastRtdpBelRow()), OverFamily(FastCertifiedRow())};
+  table.family_base = table.family_reference = table.family_rows.size() - 1;
   return table;
 }
 
 ExperimentResult RunTable1Plug(const ExperimentRequest& request) {
-  return RunDatabaseTable(LoadPlanningCase("plug", false, request), Table1Plug(), ProtocolFor(request.quick), request);
+  const PlanningCase planning = LoadPlanningCase("plug", false, request);
+  return RunDatabaseTable(planning, WithPrintedValuesOf(Table1Plug(), planning.task.name), ProtocolFor(request.quick),
+                          request);
 }
 
 }  // namespace feeler::evaluation

@@ -174,15 +174,16 @@ SampleProtocol SmallProtocol() {
   protocol.strata = 2;
   protocol.per_stratum = 2;
   protocol.solver_seeds = 2;
-  protocol.time_limit_s = 1e6;
+  protocol.cpu_limit_s = 1e6;
   protocol.expansion_limit = 3000;
   return protocol;
 }
 
 Experiment SmallTable(DatabaseTable (*table)()) {
-  return {table().name, "", [table](const ExperimentRequest& request) {
-            return RunDatabaseTable(SmallPlug(), table(), SmallProtocol(), request);
-          }};
+  const auto run = [table](const ExperimentRequest& request) {
+    return RunDatabaseTable(SmallPlug(), table(), SmallProtocol(), request);
+  };
+  return {table().name, "", run, false, true};
 }
 
 ExperimentRequest RequestIn(const std::string& folder) {
@@ -210,7 +211,7 @@ TEST_P(DatabaseTables, HoldARowASolverWithSuccessIntervalsAndRatios) {
   const ExperimentResult result =
       RunDatabaseTable(SmallPlug(), table, SmallProtocol(), RequestIn(Scratch("rows_" + table.name)));
   ASSERT_TRUE(result.complete);
-  ASSERT_EQ(result.table.rows.size(), table.rows.size());
+  ASSERT_EQ(result.table.rows.size(), table.rows.size() + table.family_rows.size());
   EXPECT_EQ(result.seeds, (std::vector<std::uint64_t>{1, 2}));
   const auto column = [&](std::size_t row, const std::string& name) {
     const auto at = std::find(result.table.columns.begin(), result.table.columns.end(), name);
@@ -234,6 +235,17 @@ TEST_P(DatabaseTables, HoldARowASolverWithSuccessIntervalsAndRatios) {
   EXPECT_EQ(column(table.base, "relative_speedup_cpu"), 1.0);
   EXPECT_EQ(column(table.base, "relative_speedup_expansions"), 1.0);
   EXPECT_EQ(column(table.reference, "success_percent"), 100.0);
+  for (std::size_t i = 0; i < table.family_rows.size(); ++i) {
+    const std::size_t row = table.rows.size() + i;
+    SCOPED_TRACE(table.family_rows[i].solver.label);
+    EXPECT_EQ(column(row, "problems"), "family");
+    EXPECT_EQ(column(row, "attempts"), 12);  // every problem once
+    EXPECT_EQ(column(row, "solved"), 12);
+    EXPECT_NE(result.text.find(table.family_rows[i].solver.label), std::string::npos);
+  }
+  EXPECT_EQ(column(table.rows.size() + table.family_base, "relative_speedup_expansions"), 1.0);
+  const double gap = result.details.at("cost_over_start_heuristic").at("low");
+  EXPECT_GE(gap, 1.0 - 1e-9);  // the heuristic is admissible
 }
 
 TEST_P(DatabaseTables, InterruptedAndContinuedMeasureTheSame) {
@@ -271,6 +283,12 @@ TEST_P(DatabaseTables, SecondRunRerunsNothingAndLeavesTheSameFiles) {
   const ExperimentOutcome second = RunExperiment(SmallTable(GetParam()), RequestIn(folder));
   EXPECT_EQ(second.text, first.text);
   for (const auto& [file, content] : files) EXPECT_EQ(Read(file), content) << file;
+
+  ExperimentRequest more = RequestIn(folder);  // the finished seeds stay as they are
+  more.solver_seeds = 3;
+  ASSERT_TRUE(RunExperiment(SmallTable(GetParam()), more).complete);
+  ASSERT_TRUE(RunExperiment(SmallTable(GetParam()), RequestIn(folder)).complete);
+  EXPECT_EQ(Read(folder + "/" + name + ".csv"), files.at(folder + "/" + name + ".csv"));
 
   ExperimentRequest other = RequestIn(folder);
   other.seed = 2;
