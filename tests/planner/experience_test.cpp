@@ -3,7 +3,12 @@
 //  - heur^E of the beliefs of B^E is the fixed point of equation 6, found here by brute force over all pairs; heur^E <=
 //  epsilon heur everywhere;
 //  - heur(b,b') satisfies the triangle inequality and heur(b) <= heur(b,b') + heur(b');
-//  - with any experience the cost is at most epsilon V* (oracle: value iteration, brute_force.h).
+//  - jumps to subsets only lower heur^E;
+//  - a policy rolled out from its own start is followed to its end: where epsilon is too large for jumps,
+//  heur^E(b_start) is its cost;
+//  - with any experience the cost is at most epsilon V* (oracle: value iteration, brute_force.h);
+//  - experience saves expansions: with its own policy, and with that of a neighbour, E-RTDP-Bel expands less than
+//  RTDP-Bel.
 
 #include "planner/solver/experience.h"
 
@@ -81,7 +86,8 @@ TEST(Experience, EmptyExperienceIsRtdpBel) {
 TEST(Experience, HeuristicIsTheFixedPoint) {
   int experiences = 0;
   for (std::uint64_t index = 0; index < 60; ++index) {
-    const LatticeProblemData data = RandomProblem(7, index, {.three_d = index % 2 == 1});
+    const LatticeProblemData data =
+        RandomProblem(7, index, {.three_d = index % 2 == 1, .weights = index % 5 == 0, .costs = index % 3 == 0});
     SCOPED_TRACE(data.name);
     if (data.hypotheses.size() < 3) continue;
     const Problem simpler = MakeLatticeProblem(Simpler(data));
@@ -144,7 +150,8 @@ TEST(Experience, JumpsAreConsistent) {
 
 TEST(Experience, CostStaysWithinEpsilon) {
   for (std::uint64_t index = 0; index < 40; ++index) {
-    const LatticeProblemData data = RandomProblem(9, index, {.three_d = index % 2 == 1, .costs = index % 3 == 0});
+    const LatticeProblemData data =
+        RandomProblem(9, index, {.three_d = index % 2 == 1, .weights = index % 5 == 0, .costs = index % 3 == 0});
     SCOPED_TRACE(data.name);
     if (data.hypotheses.size() < 3) continue;
     const Problem simpler = MakeLatticeProblem(Simpler(data));
@@ -161,6 +168,74 @@ TEST(Experience, CostStaysWithinEpsilon) {
         EXPECT_LE(result.expected_cost, epsilon * oracle.optimal_cost() + 1e-7);
         EXPECT_LE(result.lower_bound, oracle.optimal_cost() + 1e-7);
       }
+    }
+  }
+}
+
+TEST(Experience, JumpsToSubsetsOnlyLowerTheHeuristic) {
+  for (std::uint64_t index = 0; index < 20; ++index) {
+    const LatticeProblemData data = RandomProblem(10, index, {.three_d = index % 2 == 1});
+    if (data.hypotheses.size() < 3) continue;
+    const Problem problem = MakeLatticeProblem(data);
+    const SolverResult solved = Solve(MakeLatticeProblem(Simpler(data)), Options(SolverKind::kRtdpBel, 2.0));
+    if (!solved.complete()) continue;
+    const PlanningTables tables(problem, Options(SolverKind::kERtdpBel, 2.0));
+    BeliefGraph graph(problem, tables.masks(), false);
+    const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+    graph.SetHeuristic(heuristic.get());
+    const ExperienceMdp mdp = RollOut(graph, *solved.policy);
+    ExperienceHeuristic same(graph, mdp, 2.0, JumpKind::kSameHypotheses);
+    ExperienceHeuristic subsets(graph, mdp, 2.0, JumpKind::kSubsets);
+    for (std::size_t i = 0; i < mdp.entries.size(); ++i) graph.Actions(mdp.entries[i].belief);
+    for (BeliefId b = 0; b < graph.size(); ++b) EXPECT_LE(subsets(b), same(b) + 1e-9);
+  }
+}
+
+TEST(Experience, OwnPolicyIsFollowedToItsEnd) {
+  int followed = 0;
+  for (std::uint64_t index = 0; index < 30; ++index) {
+    const LatticeProblemData data = RandomProblem(11, index, {.three_d = index % 2 == 1, .costs = index % 3 == 0});
+    const Problem problem = MakeLatticeProblem(data);
+    const SolverResult solved = Solve(problem, Options(SolverKind::kRtdpBel, 2.0));
+    if (!solved.complete() || solved.expected_cost <= 0.0) continue;
+    const PlanningTables tables(problem, Options(SolverKind::kERtdpBel, 2.0));
+    BeliefGraph graph(problem, tables.masks(), false);
+    const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+    graph.SetHeuristic(heuristic.get());
+    const BeliefId start = graph.Start();
+    ExperienceHeuristic experience(graph, RollOut(graph, *solved.policy), 1e6, JumpKind::kSameHypotheses);
+    EXPECT_LE(experience(start), solved.expected_cost + 1e-9);
+    bool informed = true;
+    for (const auto& entry : experience.experience().entries) informed &= graph.Heuristic(entry.belief) > 1e-3;
+    if (!informed) continue;
+    EXPECT_NEAR(experience(start), solved.expected_cost, 1e-9);
+    ++followed;
+  }
+  EXPECT_GT(followed, 10);
+}
+
+/// A regression of speed in expansions, which no machine changes.
+TEST(Experience, SavesExpansions) {
+  const Task task = testing::MakePlugTask();
+  const auto map = testing::MakePlugMap();
+  const Problem problem = MakeCuboidProblem(task, map, {6, 6, 6});
+  const auto tables = BuildPlanningTables(problem, Options(SolverKind::kRtdpBel, 2.0));
+  for (const double epsilon : {2.0, 3.0, 5.0}) {
+    SCOPED_TRACE(epsilon);
+    const SolverResult without = Solve(problem, Options(SolverKind::kRtdpBel, epsilon), tables);
+    ASSERT_TRUE(without.complete());
+    const SolverResult own = Solve(problem, Options(SolverKind::kERtdpBel, epsilon), tables,
+                                   {ExperienceKind::kRollout, &problem, &*without.policy});
+    EXPECT_LT(own.expansions, 0.35 * static_cast<double>(without.expansions));
+    EXPECT_LE(own.expected_cost, without.expected_cost * (1.0 + 1e-9));
+    for (const Extents& neighbour : {Extents{6, 6, 5}, Extents{6, 5, 6}, Extents{5, 6, 6}}) {
+      const Problem similar = MakeCuboidProblem(task, map, neighbour);
+      const SolverResult solved = Solve(similar, Options(SolverKind::kRtdpBel, epsilon), tables);
+      ASSERT_TRUE(solved.complete());
+      const SolverResult with = Solve(problem, Options(SolverKind::kERtdpBel, epsilon), tables,
+                                      {ExperienceKind::kRollout, &similar, &*solved.policy});
+      RecordProperty(ToString(neighbour), static_cast<int>(with.expansions));
+      EXPECT_LT(with.expansions, without.expansions) << ToString(neighbour);
     }
   }
 }
