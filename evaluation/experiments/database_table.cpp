@@ -297,7 +297,7 @@ ExperimentResult RunDatabaseTable(const PlanningCase& planning_case, DatabaseTab
   SolverSweep sweep(planning_case, sample, rows, result.seeds, context);
   context.keep_policies = false;
   SolverSweep family_sweep(planning_case, whole, family_rows, {request.seed}, context);
-  if (!sweep.Run() || !family_sweep.Run()) return result;
+  if (!family_sweep.Run() || !sweep.Run()) return result;
 
   std::vector<Section> sections = {{"sample", &table.rows, table.base, table.reference, {}}};
   for (std::size_t i = 0; i < rows.size(); ++i) sections[0].measured.push_back(Measure(sweep, sections[0], i));

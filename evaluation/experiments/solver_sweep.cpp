@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <tuple>
 #include <utility>
 
@@ -160,8 +161,9 @@ std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const plan
 bool SolverSweep::Run() {
   const auto total = static_cast<std::int64_t>(sample_.problems.size() * rows_.size() * seeds_.size());
   std::int64_t before = 0;
-  for (const std::uint64_t seed : seeds_) {
-    for (const SolverRow& row : rows_) {
+  // The last rows first: the base, which is the slowest, has the rest beside it if it is interrupted.
+  for (const SolverRow& row : std::ranges::reverse_view(rows_)) {
+    for (const std::uint64_t seed : seeds_) {
       Sink sink(*this, row, seed);
       const bool finished = std::all_of(sample_.problems.begin(), sample_.problems.end(),
                                         [&](const planner::Extents& extents) { return sink.Find(extents) != nullptr; });
