@@ -15,6 +15,10 @@ constexpr double kFarthest = 3.5;
 /// The wall is looked for at least this far behind where it is expected, in cells: the fit may be surer than it is
 /// right.
 constexpr double kLeastSlack = 1.5;
+/// A contact after a shorter motion may be the wall that the tool has just come off, in cells.
+constexpr double kLeastTold = 0.25;
+/// After a blocked path the tool comes out by this, in cells.
+constexpr double kComeOut = 2.0;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameWall = 0.2;
 
@@ -83,18 +87,19 @@ bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, c
   for (std::size_t i = 1; i < path.size(); ++i) {
     const Eigen::Vector3d from = mover.position();
     const Eigen::Vector3d to = target + path[i].cast<double>() + map.phase();
-    const std::optional<Direction> direction = DirectionOf(to - from);
     const MotionReport report = mover.Fast(to, kind);
-    if (!report.contact) continue;
-    if (direction) {
-      Touch touch;
-      touch.direction = *direction;
-      touch.contact = true;
-      touch.start = report.end;
-      touch.start[AxisOf(*direction)] = from[AxisOf(*direction)];
-      touch.travelled = SignOf(*direction) * (report.end - from)[AxisOf(*direction)];
-      evidence.push_back(touch);
+    if (!report.contact) {
+      Touch free;
+      const auto direction = DirectionOf(to - from);
+      if (!direction || (to - from).norm() < 1.0) continue;
+      free.start = to;
+      free.start[AxisOf(*direction)] = from[AxisOf(*direction)];
+      free.direction = *direction;
+      free.travelled = (to - from).norm();
+      evidence.push_back(free);
+      continue;
     }
+    if ((report.end - from).norm() > kLeastTold) evidence.push_back(ContactAfter(from, report.end));
     const Eigen::Vector3d back = from - report.end;
     const double length = back.norm();
     mover.Retreat(length > 1.0 ? Eigen::Vector3d(report.end + back / length) : from);
@@ -133,6 +138,9 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
       evidence.push_back(touch);
       const double off = std::max(mover.Cells(options.retreat_m), 0.5);
       mover.Retreat(report.end - off * UnitVector(plan->direction));
+    } else {
+      // Something stands where the fit says there is nothing. From farther out the next path is another one.
+      mover.Retreat(mover.position() - kComeOut * UnitVector(insertion));
     }
     fit = BestFit(map, evidence, likely, possible, orientation, options.fit);
   }

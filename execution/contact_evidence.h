@@ -15,9 +15,16 @@ struct Touch {
   Direction direction = Direction::kMinusZ;
   double travelled = 0.0;  ///< cells
   bool contact = false;    ///< it ended at a contact; without: all of it was free
+  /// Of a contact that ended a motion along no axis: its direction (unit vector); zero otherwise. Which wall it met is
+  /// open: one across any axis that the motion went along. `direction` is then the axis it mostly went along.
+  Eigen::Vector3d oblique = Eigen::Vector3d::Zero();
 
+  bool is_oblique() const { return !oblique.isZero(); }
   Eigen::Vector3d end() const { return start + travelled * UnitVector(direction); }
 };
+
+/// A contact at `end` of a motion from `start`; axis by axis or oblique.
+Touch ContactAfter(const Eigen::Vector3d& start, const Eigen::Vector3d& end);
 
 /// How badly a target at `target` (lattice coordinates) explains a touch, in cells: the distance of a contact from the
 /// wall it should have met, the depth to which a free motion would have gone into a wall. Positions across the motion

@@ -255,6 +255,7 @@ std::string ClimbLadder(const Episode& episode, const planner::Problem& problem,
       next = NewAttempt(episode, problem, world_T_estimate, WithMargin(episode.task, problem), *planner);
     }
     if (!next) {
+      attempt.end = AttemptEnd::kLost;
       attempt.reason = "ladder: no policy within the budget";
       continue;
     }

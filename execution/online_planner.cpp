@@ -17,7 +17,9 @@ std::shared_ptr<const planner::PlanningTables> OnlinePlanner::TablesFor(const pl
 }
 
 std::unique_ptr<policies::Policy> OnlinePlanner::PolicyFor(const planner::Problem& problem) {
-  planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kRtdpBel, 2.0);
+  // The certified solver has a complete policy at any budget; a better one than this is not worth a robot's waiting.
+  planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
+  options.gap = 1.5;
   options.expansion_limit = expansion_limit_;
   const planner::SolverResult result = planner::Solve(problem, options, TablesFor(problem, options));
   if (!result.policy) return nullptr;

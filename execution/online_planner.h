@@ -10,12 +10,12 @@
 
 namespace feeler::execution {
 
-/// Plans for a belief that no database holds, while the robot waits: RTDP-Bel with a budget of expansions, so that the
-/// policy is the same wherever and whenever it is computed. The tables of a contact map are built at its first problem
+/// Plans for a belief that no database holds, while the robot waits: with a budget of expansions, not of time, so
+/// that the policy is the same wherever and whenever it is computed. The tables of a contact map are built at its first problem
 /// and shared by all that follow. Thread-safe.
 class OnlinePlanner {
  public:
-  explicit OnlinePlanner(std::int64_t expansion_limit = 20000) : expansion_limit_(expansion_limit) {}
+  explicit OnlinePlanner(std::int64_t expansion_limit = 3000) : expansion_limit_(expansion_limit) {}
 
   /// A policy for the problem; null if there is none within the budget.
   std::unique_ptr<policies::Policy> PolicyFor(const planner::Problem& problem);

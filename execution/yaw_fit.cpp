@@ -36,7 +36,7 @@ std::optional<YawFit> YawFromEvidence(const planner::ContactMap& map, Direction 
     double n = 0.0, sum_t = 0.0, sum_c = 0.0, sum_tt = 0.0, sum_tc = 0.0;
     double least = 1e9, greatest = -1e9;
     for (const Touch& touch : evidence) {
-      if (!touch.contact || touch.direction != direction) continue;
+      if (!touch.contact || touch.is_oblique() || touch.direction != direction) continue;
       const Eigen::Vector3d place = touch.end() - target;
       const double t = place[wall->along] - middle;
       if (std::abs(t) > kInnerPart * wall->half_range || std::abs(place[axis] - face) > 1.5) continue;
