@@ -15,6 +15,8 @@ class BeliefHeuristic {
   virtual ~BeliefHeuristic() = default;
   /// `robot` is relative to the set's frame.
   virtual double Weighted(SetId set, const Cell& robot) = 0;
+  /// A guess at the optimal expected cost times the weight, for choosing among actions; no bound.
+  virtual double Estimate(SetId set, const Cell& robot) { return Weighted(set, robot); }
   /// Memory of what is cached per set.
   virtual std::size_t bytes() const { return 0; }
 };

@@ -26,6 +26,20 @@ const PairCertificates::Plane& PairCertificates::Get(const Cell& offset, int ori
   return *plane;
 }
 
+std::optional<Cell> NearestToTellApart(const HypothesisSets& sets, SetId set, const Cell& member, int orientation,
+                                       const Cell& spread) {
+  std::optional<Cell> nearest;
+  int distance = std::numeric_limits<int>::max();
+  sets.ForEach(set, [&](const Cell& other, int other_orientation, std::uint32_t, int) {
+    const Cell offset = other - member;
+    const bool apart = (offset.cwiseAbs().array() > spread.array()).any();
+    if (!apart || other_orientation != orientation || offset.cwiseAbs().sum() >= distance) return;
+    distance = offset.cwiseAbs().sum();
+    nearest = offset;
+  });
+  return nearest;
+}
+
 IsolatedHypotheses::IsolatedHypotheses(const HypothesisSets& sets, std::shared_ptr<const PairCertificates> pairs,
                                        const std::array<Cell, 6>& neighbours)
     : sets_(sets), pairs_(std::move(pairs)), neighbours_(neighbours) {}
@@ -40,17 +54,9 @@ const IsolatedHypotheses::Terms& IsolatedHypotheses::Prepare(SetId set) {
   std::size_t k = 0;
   sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
     if (masks_[k++] != 0) return;
-    Cell nearest = Cell::Zero();
-    int distance = std::numeric_limits<int>::max();
-    sets_.ForEach(set, [&](const Cell& other, int other_orientation, std::uint32_t, int) {
-      const Cell offset = other - h;
-      const bool apart = (offset.cwiseAbs().array() > pairs_->spread().array()).any();
-      if (!apart || other_orientation != orientation || offset.cwiseAbs().sum() >= distance) return;
-      distance = offset.cwiseAbs().sum();
-      nearest = offset;
-    });
-    if (distance == std::numeric_limits<int>::max()) return;
-    terms_.push_back({&pairs_->Get(nearest, orientation), h, sets_.Weight(layer, bit)});
+    const auto nearest = NearestToTellApart(sets_, set, h, orientation, pairs_->spread());
+    if (!nearest) return;
+    terms_.push_back({&pairs_->Get(*nearest, orientation), h, sets_.Weight(layer, bit)});
   });
   terms.count = static_cast<std::uint32_t>(terms_.size()) - terms.first;
   return terms;

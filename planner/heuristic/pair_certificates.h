@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "core/lattice.h"
@@ -39,6 +40,11 @@ class PairCertificates {
   mutable std::mutex mutex_;
   mutable std::map<std::array<int, 4>, std::unique_ptr<const Plane>> planes_;
 };
+
+/// Offset from a member of a set to the nearest other one of its orientation that no goal may leave together with it;
+/// none if there is no such.
+std::optional<Cell> NearestToTellApart(const HypothesisSets& sets, SetId set, const Cell& member, int orientation,
+                                       const Cell& spread);
 
 /// Lower bounds for the *isolated* hypotheses of a belief, those that have no neighbour at the given offsets in it, on
 /// which heuristics that look at those neighbours are silent: each must be told apart from the nearest other

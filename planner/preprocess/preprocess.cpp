@@ -21,6 +21,17 @@ constexpr std::size_t kLookAhead = 256;
 /// Budget of the certified solver for a problem where none is given.
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
 
+/// The largest extents along each axis.
+Extents LargestExtents(const ProblemFamily& family) {
+  Extents largest;
+  for (const Extents& extents : family.problems) {
+    largest.nx = std::max(largest.nx, extents.nx);
+    largest.ny = std::max(largest.ny, extents.ny);
+    largest.nz = std::max(largest.nz, extents.nz);
+  }
+  return largest;
+}
+
 class Framework {
  public:
   Framework(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
@@ -44,7 +55,7 @@ class Framework {
     summary_.problems = static_cast<std::int64_t>(order_.size());
     if (!order_.empty()) {
       tables_ = options_.tables;
-      if (!tables_) tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, family_.problems.front()), solver_);
+      if (!tables_) tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)), solver_, options_.jobs);
       MarkStored();
       std::vector<std::jthread> threads;
       for (int i = 1; i < options_.jobs.threads(); ++i) threads.emplace_back([this] { Work(); });
@@ -190,6 +201,10 @@ SolverOptions WithFamilyBudget(SolverOptions solver) {
   if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
       solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
     solver.expansion_limit = kDefaultExpansionLimit;
+  }
+  if (solver.solver == SolverKind::kCertified && solver.gap < kTightGap && solver.cuboids_where_tight &&
+      solver.heuristic == HeuristicKind::kCertificate) {
+    solver.heuristic = HeuristicKind::kCuboids;
   }
   return solver;
 }

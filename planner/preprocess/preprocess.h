@@ -25,7 +25,8 @@ class PolicySink {
 };
 
 /// The options that each problem of a family is solved with: the certified solver without any limit is given 20,000
-/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family.
+/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family; at a gap
+/// below kTightGap it takes cuboids for certificates, unless told not to.
 SolverOptions WithFamilyBudget(SolverOptions solver);
 
 struct PreprocessOptions {

@@ -25,7 +25,9 @@ class GreedyCompletion {
  public:
   using Belief = std::uint32_t;
 
-  explicit GreedyCompletion(Model& model) : model_(model) {}
+  /// `estimate` guesses the value of a belief times its weight; without it the heuristic does.
+  explicit GreedyCompletion(Model& model, std::function<double(Belief)> estimate = {})
+      : model_(model), estimate_(std::move(estimate)) {}
 
   /// Finds a policy from `start`; kUnlocalizable if there is none by the heuristic. Nothing is kept of beliefs in work
   /// when `stop(expansions)` interrupts.
@@ -87,7 +89,8 @@ class GreedyCompletion {
     nodes_[b] = {value, action};
   }
 
-  double Estimate(Belief b) { return Solved(b) ? nodes_[b].value : model_.Heuristic(b); }
+  double Guess(Belief b) const { return estimate_ ? estimate_(b) : model_.Heuristic(b); }
+  double Estimate(Belief b) const { return Solved(b) ? nodes_[b].value : Guess(b); }
 
   template <class Stop>
   std::optional<SolverStatus> MakePlan(Belief start, Stop& stop) {
@@ -95,7 +98,7 @@ class GreedyCompletion {
     using Entry = std::tuple<double, Belief>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
     std::unordered_map<Belief, Reached> reached = {{start, {}}};
-    queue.emplace(model_.Heuristic(start), start);
+    queue.emplace(Guess(start), start);
     double best = std::numeric_limits<double>::infinity();
     std::pair<Belief, int> last = {start, -1};
     while (!queue.empty()) {
@@ -103,7 +106,7 @@ class GreedyCompletion {
       queue.pop();
       if (estimate >= best) break;
       const double cost = reached.at(b).cost;
-      if (estimate > cost + model_.Heuristic(b) + 1e-9 * (1.0 + estimate)) continue;  // outdated
+      if (estimate > cost + Guess(b) + 1e-9 * (1.0 + estimate)) continue;  // outdated
       if (const auto why = stop(expansions_)) return why;
       if (!model_.expanded(b)) ++expansions_;
       int index = -1;
@@ -145,6 +148,7 @@ class GreedyCompletion {
   }
 
   Model& model_;
+  std::function<double(Belief)> estimate_;
   std::vector<State> nodes_;
   std::unordered_map<Belief, Plan> plans_;
   std::int64_t expansions_ = 0;

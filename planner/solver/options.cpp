@@ -22,6 +22,7 @@ std::string_view ToString(HeuristicKind kind) {
     case HeuristicKind::kCertificate: return "certificate";
     case HeuristicKind::kLines: return "lines";
     case HeuristicKind::kFirstContact: return "first-contact";
+    case HeuristicKind::kCuboids: return "cuboids";
   }
   return "?";
 }

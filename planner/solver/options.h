@@ -15,13 +15,14 @@ enum class HeuristicKind {
   kCertificate,   ///< mean cost to tell each hypothesis from its neighbours: tight, the default
   kLines,         ///< exact values of lines of hypotheses: medium, the paper setting
   kFirstContact,  ///< distance to the first possible contact: weak
+  kCuboids,       ///< values of all cuboids of hypotheses: tightest; seconds to minutes of tables, up to 1 GB
 };
 /// Which beliefs of the experience E-RTDP-Bel may jump to (heur(b,b') of equation 5; see JumpHeuristic).
 enum class JumpKind {
   kSameHypotheses,  ///< those with the same hypotheses: no policy leads from b to fewer for certain. The default
   kSubsets,         ///< also those with fewer: a jump then counts the hypotheses it drops as dealt with
 };
-/// "rtdp-bel", "e-rtdp-bel", "certified"; "certificate", "lines", "first-contact"; "same", "subsets".
+/// "rtdp-bel", "e-rtdp-bel", "certified"; "certificate", "lines", "first-contact", "cuboids"; "same", "subsets".
 std::string_view ToString(SolverKind kind);
 std::string_view ToString(HeuristicKind kind);
 std::string_view ToString(JumpKind kind);
@@ -40,6 +41,9 @@ struct BoundsRow {
   }
 };
 
+/// Gaps below this are out of reach of certificates.
+inline constexpr double kTightGap = 1.1;
+
 struct SolverOptions {
   SolverKind solver = SolverKind::kCertified;
   /// RTDP-Bel and E-RTDP-Bel: inflation of the heuristic; the policy costs at most epsilon times the optimum. >= 1.
@@ -53,6 +57,8 @@ struct SolverOptions {
   std::size_t memory_limit_bytes = std::size_t{1} << 31;
   std::uint64_t seed = 1;
   HeuristicKind heuristic = HeuristicKind::kCertificate;
+  /// Families of problems at a gap below kTightGap take cuboids for certificates: see WithFamilyBudget.
+  bool cuboids_where_tight = true;
   /// Beliefs that are translates of each other count as one. Only used where that is exact: uniform weights, a generous
   /// workspace. Off is the paper's setting. E-RTDP-Bel always works without.
   bool canonical_translation = true;

@@ -2,6 +2,7 @@
 
 #include "planner/contact/fill_dead_ends.h"
 #include "planner/heuristic/certificate.h"
+#include "planner/heuristic/cuboid_heuristic.h"
 
 namespace feeler::planner {
 namespace {
@@ -10,9 +11,20 @@ Cell SpreadOf(const Problem& problem) {
   return problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
 }
 
+/// Extents of the box of the hypotheses.
+Cell ExtentsOf(const Problem& problem) {
+  Cell low = problem.hypotheses.front().offset;
+  Cell high = low;
+  for (const Hypothesis& h : problem.hypotheses) {
+    low = low.cwiseMin(h.offset);
+    high = high.cwiseMax(h.offset);
+  }
+  return high - low + Cell::Ones();
+}
+
 }  // namespace
 
-PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options)
+PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs)
     : map_(problem.map), problem_(problem), options_(options), masks_(*problem.map) {
   options_.cancellation = nullptr;
   options_.on_bounds = nullptr;
@@ -27,6 +39,11 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
         certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
       }
       break;
+    case HeuristicKind::kCuboids:
+      certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
+      cuboids_ = std::make_shared<CuboidTable>(*problem.map, masks_, *certificate_, costs, SpreadOf(problem),
+                                               ExtentsOf(problem), jobs);
+      break;
     case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
@@ -38,6 +55,7 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& pr
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
+  if (cuboids_) return std::make_unique<CuboidHeuristic>(sets, cuboids_, certificate_, pairs_);
   return std::make_unique<CertificateHeuristic>(sets, certificate_, pairs_);
 }
 
@@ -49,7 +67,7 @@ const PlanningTables::Filled& PlanningTables::filled() const {
     problem.map = filled_.map;
     SolverOptions options = options_;
     options.heuristic = HeuristicKind::kCertificate;  // the bound is made of them
-    filled_.tables = std::make_shared<const PlanningTables>(problem, options);
+    filled_.tables = std::make_shared<const PlanningTables>(problem, options, Parallelism());
     if (!filled_.tables->certificate_) return;
     filled_.bound =
         std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
@@ -58,8 +76,9 @@ const PlanningTables::Filled& PlanningTables::filled() const {
   return filled_;
 }
 
-std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options) {
-  return std::make_shared<PlanningTables>(problem, options);
+std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
+                                                          Parallelism jobs) {
+  return std::make_shared<PlanningTables>(problem, options, jobs);
 }
 
 }  // namespace feeler::planner

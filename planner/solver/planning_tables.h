@@ -6,6 +6,7 @@
 #include "planner/belief/contact_masks.h"
 #include "planner/heuristic/belief_heuristic.h"
 #include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/cuboid_table.h"
 #include "planner/heuristic/first_contact.h"
 #include "planner/heuristic/lines.h"
 #include "planner/heuristic/local_certificate.h"
@@ -17,7 +18,7 @@ namespace feeler::planner {
 
 class PlanningTables {
  public:
-  PlanningTables(const Problem& problem, const SolverOptions& options);
+  PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs = {});
 
   const ContactMasks& masks() const { return masks_; }
   /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
@@ -39,6 +40,7 @@ class PlanningTables {
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;
+  std::shared_ptr<const CuboidTable> cuboids_;
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;
   std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then

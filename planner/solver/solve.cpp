@@ -22,8 +22,7 @@ namespace feeler::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Up to so many hypotheses the greedy policy is tried beside the one for
-/// openings.
+/// Up to so many hypotheses the greedy policy is tried beside the one for openings.
 constexpr std::uint32_t kGreedyBesideOpen = 256;
 
 /// epsilon * heur, times the weight of the belief.
@@ -33,8 +32,7 @@ struct InflatedHeuristic {
   double operator()(BeliefId b) const { return epsilon * graph->Heuristic(b); }
 };
 
-/// One attempt at a problem: the belief graph, the clocks, and what every
-/// solver does with them.
+/// One attempt at a problem: the belief graph, the clocks, and what every solver does with them.
 class Attempt {
  public:
   Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
@@ -105,18 +103,17 @@ class Attempt {
     }
   }
 
-  /// A first policy, then BoundedSearch until the gap is closed. A complete
-  /// policy comes first: it is not interrupted by limits.
+  /// A first policy, then BoundedSearch until the gap is closed. A complete policy comes first: it is not interrupted
+  /// by limits.
   void RunCertified() {
     result_.lower_bound = graph_.Heuristic(start_) / weight_;
     if (graph_.problem().generous_workspace && tables_.filled().bound) {
       const double bound = tables_.filled().bound->Weighted(graph_.sets(), graph_.set(start_), graph_.robot(start_));
       result_.lower_bound = std::max(result_.lower_bound, bound / weight_);
     }
-    GreedyCompletion greedy(graph_);
+    GreedyCompletion greedy(graph_, Estimate());
     if (const std::optional<Problem> filled = WithoutDeadEnds()) {
-      // Dead ends make beliefs many and the greedy choice short-sighted (it
-      // looks into them one by one).
+      // Dead ends make beliefs many and the greedy choice short-sighted (it looks into them one by one).
       BeliefGraph filled_graph(*filled, tables_.filled().tables->masks(), graph_.canonical());
       const auto heuristic = tables_.filled().tables->MakeHeuristic(*filled, filled_graph.sets());
       filled_graph.SetHeuristic(heuristic.get());
@@ -129,6 +126,11 @@ class Attempt {
     }
   }
 
+  std::function<double(BeliefId)> Estimate() {
+    if (options_.heuristic != HeuristicKind::kCuboids) return {};
+    return [this](BeliefId b) { return heuristic_->Estimate(graph_.set(b), graph_.robot(b)); };
+  }
+
   /// False, and says so in the result, if some hypotheses cannot be told apart.
   bool Complete(GreedyCompletion<BeliefGraph>& greedy) {
     if (!greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); })) return true;
@@ -139,8 +141,7 @@ class Attempt {
     return false;
   }
 
-  /// The problem on the map whose dead ends are filled; none where there are
-  /// none, or the tool is in one.
+  /// The problem on the map whose dead ends are filled; none where there are none, or the tool is in one.
   std::optional<Problem> WithoutDeadEnds() {
     const Problem& problem = graph_.problem();
     if (!problem.generous_workspace || !tables_.filled().bound) return std::nullopt;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/parallelism.h"
 #include "planner/belief/problem.h"
 #include "planner/solver/options.h"
 #include "planner/solver/policy.h"
@@ -37,8 +38,10 @@ struct SolverResult {
 /// Read-only tables that depend on the contact map, the costs and the goal but not on the hypotheses: contact masks and
 /// heuristic values. Built once, shared by all problems of a family and by any number of threads.
 class PlanningTables;
-/// Builds what `options` needs for problems with the map, costs, move lengths and goal of `problem`.
-std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options);
+/// Builds what `options` needs for problems with the map, costs, move lengths and goal of `problem`; tables of cuboids,
+/// with `jobs` threads, for hypotheses that span no more than those of `problem` (larger sets are cut).
+std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
+                                                          Parallelism jobs = {});
 
 /// Where E-RTDP-Bel takes its experience from (the paper, Section V-C and Table III).
 enum class ExperienceKind {

@@ -1,7 +1,7 @@
 // Oracle: value iteration over all reachable beliefs (brute_force.h). Laws of every heuristic, on every reachable
 // belief of random small lattice problems with all kinds of costs, weights and goals: admissible, h <= V*; consistent,
-// h(b) <= C(b,a) + sum P h(b') for every action; zero at goals. On closed and open plug maps canonical beliefs have the
-// values of the same beliefs in problem coordinates.
+// h(b) <= C(b,a) + sum P h(b') for every action (cuboids promise only the first); zero at goals. On closed and open
+// plug maps canonical beliefs have the values of the same beliefs in problem coordinates.
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ TEST_P(Heuristics, AdmissibleAndConsistent) {
     problem.generous_workspace = generous;  // takes the tables that tasks use
     SolverOptions solver;
     solver.heuristic = heuristic_kind;
-    const PlanningTables tables(problem, solver);
+    const PlanningTables tables(problem, solver, Parallelism());
     HypothesisSets sets(problem, false);
     const auto heuristic = tables.MakeHeuristic(problem, sets);
     std::vector<double> values;
@@ -62,6 +62,7 @@ TEST_P(Heuristics, AdmissibleAndConsistent) {
         ++beliefs;
       }
     }
+    if (heuristic_kind == HeuristicKind::kCuboids) continue;
     for (std::size_t b = 0; b < values.size(); ++b) {
       for (const BruteForce::Action& action : oracle.actions()[b]) {
         ASSERT_LE(values[b], BruteForce::Q(action, values) + 1e-9);
@@ -72,8 +73,8 @@ TEST_P(Heuristics, AdmissibleAndConsistent) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Heuristics,
-                         ::testing::Combine(::testing::Values(HeuristicKind::kCertificate, HeuristicKind::kLines,
-                                                              HeuristicKind::kFirstContact),
+                         ::testing::Combine(::testing::Values(HeuristicKind::kCertificate, HeuristicKind::kCuboids,
+                                                              HeuristicKind::kLines, HeuristicKind::kFirstContact),
                                             ::testing::Range(0, 16), ::testing::Bool()));
 
 }  // namespace
