@@ -82,6 +82,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 
   bool header = false;
   options.on_bounds = [&header](const planner::BoundsRow& row) {
+    if (!std::isfinite(row.lower_bound)) return;  // unlocalizable: said below
     if (!header) {
       fmt::print(stderr, "{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper",
                  "ratio");
