@@ -43,7 +43,9 @@ void ContactMapLookUp(benchmark::State& state) {
 }
 BENCHMARK(ContactMapLookUp);
 
-/// Breadth-first growth of the belief graph from the start: heuristic included, no search on top.
+/// Breadth-first growth of the belief graph from the start: heuristic included, no search on top. The worst case: near
+/// the start beliefs hold thousands of hypotheses, and the heuristic looks at each. Searches soon come to small
+/// beliefs.
 void Expansions(benchmark::State& state) {
   const Problem problem = MakeCuboidProblem(ThePlug().task, ThePlug().map, Cube(state));
   std::int64_t expansions = 0;
@@ -85,6 +87,33 @@ void ExperienceHeuristicPass(benchmark::State& state) {
   }
 }
 BENCHMARK(ExperienceHeuristicPass)->Arg(5)->Arg(9)->Arg(15)->Unit(benchmark::kMillisecond);
+
+/// The paper setting: E-RTDP-Bel with the policy of a neighbour, experience pass included; 0: RTDP-Bel.
+void SolvePaperSetting(benchmark::State& state) {
+  const int n = static_cast<int>(state.range(0));
+  const bool experienced = state.range(1) != 0;
+  const Problem similar = MakeCuboidProblem(ThePlug().task, ThePlug().map, {n, n, n - 1});
+  const Problem problem = MakeCuboidProblem(ThePlug().task, ThePlug().map, {n, n, n});
+  const SolverOptions options =
+      PaperSetting(experienced ? SolverKind::kERtdpBel : SolverKind::kRtdpBel, static_cast<double>(state.range(2)));
+  const SolverResult solved = Solve(similar, FastSetting(SolverKind::kRtdpBel, 1.2), ThePlug().fast);
+  const Experience experience = {ExperienceKind::kRollout, &similar, &*solved.policy};
+  std::int64_t expansions = 0;
+  for (auto _ : state) {
+    const SolverResult result = Solve(problem, options, ThePlug().paper, experience);
+    expansions += result.expansions;
+    state.counters["expansions"] = static_cast<double>(result.expansions);
+  }
+  state.counters["expansions/s"] = benchmark::Counter(static_cast<double>(expansions), benchmark::Counter::kIsRate);
+}
+BENCHMARK(SolvePaperSetting)
+    ->ArgNames({"n", "experience", "epsilon"})
+    ->Args({7, 0, 2})
+    ->Args({7, 1, 2})
+    ->Args({11, 0, 5})
+    ->Args({11, 1, 5})
+    ->Args({15, 1, 5})
+    ->Unit(benchmark::kMillisecond);
 
 void BuildTables(benchmark::State& state) {
   const SolverOptions options =

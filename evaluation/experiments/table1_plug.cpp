@@ -19,7 +19,7 @@ DatabaseTable Table1Plug() {
   table.rows.push_back(FastCertifiedRow());
   table.base = 0;
   table.reference = table.rows.size() - 1;
-  table.family_rows = {OverFamily(FastRtdpBelRow()), OverFamily(FastCertifiedRow())};
+  table.family_rows = {OverFamily(FastCertifiedRow())};
   table.family_base = table.family_reference = table.family_rows.size() - 1;
   return table;
 }
