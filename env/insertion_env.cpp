@@ -83,7 +83,8 @@ Pose StartPose(const Task& task, const Pose& world_T_estimate) {
 InsertionEnv::InsertionEnv(std::shared_ptr<const Scene> scene, const EnvOptions& options)
     : options_(options), robot_(std::move(scene), options.robot), limits_(options.limits.value_or(LimitsOf(task()))) {}
 
-void InsertionEnv::PlaceRobot(const Pose& world_T_target, const EpisodeOptions& options, const RandomStream& random) {
+void InsertionEnv::PlaceRobot(const Pose& world_T_target, const EpisodeOptions& options, const NoiseOptions& noise,
+                              const RandomStream& random) {
   const Scene& scene = robot_.world().scene();
   std::vector<JointVector> places = {scene.home_q_rad};
   if (options.start == StartPlace::kStartPose) {
@@ -97,7 +98,11 @@ void InsertionEnv::PlaceRobot(const Pose& world_T_target, const EpisodeOptions& 
                      "move the target or change how the robot holds the tool");
   }
   for (const JointVector& q : places) {
-    robot_.Reset(q, world_T_target, options.noise, random);
+    try {
+      robot_.Reset(q, world_T_target, noise, random, variation_.physics);
+    } catch (const WorldError&) {
+      continue;  // so deep in collision that the contacts do not fit their buffer
+    }
     if (!Touches(robot_.world().data())) return;
   }
   throw InputError("reset", fmt::format("at the start of task '{}' the robot or its tool is in collision", task().name),
@@ -113,15 +118,27 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const EpisodeOptions& options
   if (extents.empty()) {
     for (const UncertainAxis& axis : task().axes) extents.push_back(axis.max_cells);
   }
+  variation_ = options.randomize ? DrawVariation(robot_.world().scene().randomization, seed, options.episode)
+                                 : EpisodeVariation{};
   // Drawn even where a pose is given, for the check of the extents.
   RandomStream random(seed, options.episode, "true-pose");
-  const Pose drawn = DrawTruePose(task(), estimate_, extents, random);
+  Pose drawn = DrawTruePose(task(), estimate_, extents, random);
+  if (!options.hypotheses.empty()) {
+    for (const Pose& pose : options.hypotheses) {
+      if (!pose.matrix().allFinite()) throw InputError("reset", "a hypothesis is not finite");
+    }
+    drawn = options.hypotheses[random.Index(options.hypotheses.size())];
+  }
+  drawn.linear() = drawn.linear() * Eigen::AngleAxisd(variation_.yaw_rad, -UnitVector(task().insertion));
   const Pose truth = options.world_T_target.value_or(drawn);
   if (!truth.matrix().allFinite() || !estimate_.matrix().allFinite()) {
     throw InputError("reset", "the pose of the target is not finite");
   }
-  PlaceRobot(truth, options, RandomStream(seed, options.episode, "sensor"));
-  robot_.SetTargetCandidates(TargetCandidates(estimate_, HalfExtents(task(), extents)));
+  NoiseOptions noise = options.noise;
+  noise.force_offset_n += variation_.force_bias_n;
+  PlaceRobot(truth, options, noise, RandomStream(seed, options.episode, "sensor"));
+  robot_.SetTargetCandidates(options.hypotheses.empty() ? TargetCandidates(estimate_, HalfExtents(task(), extents))
+                                                        : options.hypotheses);
   robot_.SetDeadline(limits_.time_s);
   running_ = true;
   MotionResult nothing;
@@ -129,38 +146,47 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const EpisodeOptions& options
   return Result(nothing);
 }
 
-void InsertionEnv::RequireValid(const Action& action) const {
+void InsertionEnv::RequireWelcome(const Action& action) const {
+  if (!running_) throw InputError("step", "no episode is running", "call reset first");
   const ActionBounds& bounds = options_.bounds;
-  std::visit(Overloaded{
-                 [&](const GuardedMoveAction& a) {
-                   if (a.motion.distance_m != 0) {
-                     RequireWithin(a.motion.distance_m, bounds.distance_m, "guarded move", "the distance (m)");
-                   }
-                   RequireWithin(a.motion.speed_m_s, bounds.speed_m_s, "guarded move", "the speed (m/s)");
-                   RequireWithin(a.motion.contact_force_n, bounds.force_n, "guarded move", "the contact force (N)");
-                 },
-                 [&](const TransferAction& a) {
-                   RequireWithin(a.speed_m_s, bounds.speed_m_s, "transfer", "the speed (m/s)");
-                   RequireWithin(a.contact_force_n, bounds.force_n, "transfer", "the contact force (N)");
-                 },
-                 [&](const InsertAction& a) {
-                   RequireWithin(a.distance_m, bounds.distance_m, "insert", "the distance (m)");
-                   RequireWithin(a.speed_m_s, bounds.speed_m_s, "insert", "the speed (m/s)");
-                   RequireWithin(a.force_limit_n, bounds.force_n, "insert", "the force limit (N)");
-                   RequireWithin(a.time_limit_s, limits_.time_s, "insert", "the time limit (s)");
-                 },
-                 [&](const LowLevelAction& a) {
-                   RequireWithin(a.delta.head<3>(), bounds.delta_m, "low-level step", "the displacement (m)");
-                   RequireWithin(a.delta.tail<3>(), bounds.delta_rad, "low-level step", "the turn (rad)");
-                   RequireWithin(a.steps, bounds.steps, "low-level step", "the number of steps");
-                 },
-             },
-             action);
+  std::visit(
+      Overloaded{
+          [&](const GuardedMoveAction& a) {
+            if (!(std::abs(a.motion.direction.norm() - 1.0) <= 1e-6)) {
+              throw InputError("guarded move", "the direction is not a unit vector", "give one of length 1");
+            }
+            if (a.motion.distance_m != 0) {
+              RequireWithin(a.motion.distance_m, bounds.distance_m, "guarded move", "the distance (m)");
+            }
+            RequireWithin(a.motion.speed_m_s, bounds.speed_m_s, "guarded move", "the speed (m/s)");
+            RequireWithin(a.motion.contact_force_n, bounds.force_n, "guarded move", "the contact force (N)");
+          },
+          [&](const TransferAction& a) {
+            const Eigen::Matrix3d r = a.world_T_tool.linear();
+            if (!a.world_T_tool.matrix().allFinite() || !(r.transpose() * r).isIdentity(1e-6) || r.determinant() < 0) {
+              throw InputError("transfer", "the pose is not a finite rigid transform",
+                               "give a finite position and a rotation");
+            }
+            RequireWithin(a.speed_m_s, bounds.speed_m_s, "transfer", "the speed (m/s)");
+            RequireWithin(a.contact_force_n, bounds.force_n, "transfer", "the contact force (N)");
+          },
+          [&](const InsertAction& a) {
+            RequireWithin(a.distance_m, bounds.distance_m, "insert", "the distance (m)");
+            RequireWithin(a.speed_m_s, bounds.speed_m_s, "insert", "the speed (m/s)");
+            RequireWithin(a.force_limit_n, bounds.force_n, "insert", "the force limit (N)");
+            RequireWithin(a.time_limit_s, limits_.time_s, "insert", "the time limit (s)");
+          },
+          [&](const LowLevelAction& a) {
+            RequireWithin(a.delta.head<3>(), bounds.delta_m, "low-level step", "the displacement (m)");
+            RequireWithin(a.delta.tail<3>(), bounds.delta_rad, "low-level step", "the turn (rad)");
+            RequireWithin(a.steps, bounds.steps, "low-level step", "the number of steps");
+          },
+      },
+      action);
 }
 
 StepResult InsertionEnv::Step(const Action& action) {
-  if (!running_) throw InputError("step", "no episode is running", "call reset first");
-  RequireValid(action);
+  RequireWelcome(action);
   const double before_s = robot_.Time();
   const MotionResult motion =
       std::visit(Overloaded{
@@ -187,6 +213,30 @@ StepResult InsertionEnv::Step(const Action& action) {
   running_ = !result.terminated && !result.truncated;
   return result;
 }
+
+EnvState InsertionEnv::Save() const { return {robot_.Save(), estimate_, variation_, withhold_true_pose_, running_}; }
+
+void InsertionEnv::Restore(const EnvState& state) {
+  robot_.Restore(state.robot);
+  estimate_ = state.world_T_estimate;
+  variation_ = state.variation;
+  withhold_true_pose_ = state.withhold_true_pose;
+  running_ = state.running;
+}
+
+Renderer& InsertionEnv::Drawing() {
+  const Scene& scene = robot_.world().scene();
+  if (!renderer_) {
+    renderer_ = std::make_unique<Renderer>(scene.drawn_model, options_.renderer);
+    drawn_ = MakeData(*scene.drawn_model);
+  }
+  CopyForDrawing(scene, robot_.world().data(), *drawn_);
+  return *renderer_;
+}
+
+Image InsertionEnv::Render(const Camera& camera) { return Drawing().Color(*drawn_, camera); }
+
+DepthImage InsertionEnv::RenderDepth(const Camera& camera) { return Drawing().Depth(*drawn_, camera); }
 
 InsertionVerdict InsertionEnv::Judge() const {
   const World& world = robot_.world();

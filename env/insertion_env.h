@@ -13,6 +13,8 @@
 #include "core/robot.h"
 #include "core/task.h"
 #include "env/insertion_judge.h"
+#include "env/randomization.h"
+#include "env/renderer.h"
 #include "env/scene.h"
 #include "env/simulated_robot.h"
 
@@ -94,9 +96,13 @@ struct EpisodeOptions {
   std::optional<Pose> world_T_estimate;  ///< default: as the task file places the target
   std::optional<Pose> world_T_target;    ///< default: drawn around the estimate
   std::vector<int> extents;              ///< hypotheses per axis of the task; default: its largest
+  /// Where the target may stand, in place of the box that `extents` describe: a truth that is not given is one of
+  /// these, and transfers keep clear of all of them.
+  std::vector<Pose> hypotheses;
   NoiseOptions noise;
   StartPlace start = StartPlace::kStartPose;
   bool withhold_true_pose = false;  ///< all else is the same, bit for bit
+  bool randomize = true;            ///< within the ranges of the task file, if it has any; a given truth is not turned
 };
 
 struct EnvOptions {
@@ -104,6 +110,16 @@ struct EnvOptions {
   ActionBounds bounds;
   std::optional<InsertionLimits> limits;  ///< default: the task's; its time limit truncates the episode
   double reward_per_second = 0.0;         ///< added for every simulated second: negative to favour haste
+  RendererOptions renderer;
+};
+
+/// Everything that the rest of an episode depends on.
+struct EnvState {
+  RobotState robot;
+  Pose world_T_estimate = Pose::Identity();
+  EpisodeVariation variation;
+  bool withhold_true_pose = false;
+  bool running = false;
 };
 
 /// A pose around the estimate, uniform in the box of hypotheses of these extents (one per axis of the task): positions
@@ -121,6 +137,9 @@ Pose StartPose(const Task& task, const Pose& world_T_estimate);
 /// Step before Reset or after the end of the episode. Same seed and options: the same episode, bit for bit, whatever
 /// ran before.
 ///
+/// Laws: a restored state goes on bit for bit, in this environment or another of the same scene; `terminated` and
+/// `truncated` are independent; every observation lies in ObservationSpace() (env/spaces.h).
+///
 /// An executor written for any Robot drives `robot()` instead of Step, and asks `Judge` when it is done.
 /// One thread at a time; any number of environments share a scene.
 class InsertionEnv {
@@ -131,27 +150,49 @@ class InsertionEnv {
   /// environment then waits for a better Reset.
   StepResult Reset(std::uint64_t seed, const EpisodeOptions& options = {});
   StepResult Step(const Action& action);
+  /// Throws the InputError that Step would: no episode is running, or the action is not valid.
+  void RequireWelcome(const Action& action) const;
+
+  /// The whole state, between steps.
+  EnvState Save() const;
+  /// Throws InputError for the state of another model; the environment is then as it was.
+  void Restore(const EnvState& state);
 
   /// The truth of the present instant.
   InsertionVerdict Judge() const;
+
+  /// A picture of the world as it is; the first one makes a renderer (EGL), of the size in the options. Throws
+  /// InputError when that cannot be.
+  Image Render(const Camera& camera);
+  Image Render() { return Render(OverviewCamera(robot_.world().scene())); }
+  DepthImage RenderDepth(const Camera& camera);
 
   SimulatedRobot& robot() { return robot_; }
   const SimulatedRobot& robot() const { return robot_; }
   const Task& task() const { return robot_.world().scene().task; }
   const Pose& world_T_estimate() const { return estimate_; }
   const InsertionLimits& limits() const { return limits_; }
+  const EnvOptions& options() const { return options_; }
+  /// What was drawn for this episode.
+  const EpisodeVariation& variation() const { return variation_; }
+  /// Whether a Step is welcome.
+  bool running() const { return running_; }
 
  private:
-  void PlaceRobot(const Pose& world_T_target, const EpisodeOptions& options, const RandomStream& random);
-  void RequireValid(const Action& action) const;
+  void PlaceRobot(const Pose& world_T_target, const EpisodeOptions& options, const NoiseOptions& noise,
+                  const RandomStream& random);
+  Renderer& Drawing();
   StepResult Result(const MotionResult& motion) const;
 
   EnvOptions options_;
   SimulatedRobot robot_;
   InsertionLimits limits_;
   Pose estimate_ = Pose::Identity();
+  EpisodeVariation variation_;
   bool withhold_true_pose_ = false;
   bool running_ = false;
+  std::unique_ptr<Renderer> renderer_;  ///< made when first needed
+  DataHandle drawn_;
 };
 
 }  // namespace feeler::env

@@ -32,7 +32,7 @@ InsertionVerdict JudgeInsertion(const Task& task, const InsertionLimits& limits,
   const Eigen::Vector3d displacement_m = target_T_tool.translation();
   InsertionVerdict verdict;
   verdict.depth_m = displacement_m.dot(axis);
-  verdict.lateral_m = (displacement_m - verdict.depth_m * axis).norm();
+  verdict.lateral_m = (displacement_m - verdict.depth_m * axis).cwiseAbs().maxCoeff();
   verdict.angle_rad = Eigen::AngleAxisd(target_T_tool.linear()).angle();
   // Negated comparisons, so that a pose that is not a number is never inserted.
   if (!(verdict.lateral_m <= limits.lateral_m)) {

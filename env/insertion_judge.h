@@ -10,7 +10,7 @@ namespace feeler::env {
 /// Beyond which an insertion does not count.
 struct InsertionLimits {
   double depth_tolerance_m = 0.001;  ///< may be missing to the task's insertion depth
-  double lateral_m = 0.001;          ///< across the insertion axis
+  double lateral_m = 0.001;          ///< along each of the two axes across the insertion
   double angle_rad = 0.1;
   double force_n = 250.0;  ///< peak contact force on the tool in the episode; more breaks something
   double time_s = 120.0;   ///< since the reset
@@ -27,7 +27,7 @@ struct InsertionVerdict {
   bool inserted = false;
   InsertionReason reason = InsertionReason::kTooShallow;  ///< the first that applies, geometry before force and time
   double depth_m = 0.0;    ///< of the tool origin below the mouth, along the insertion direction
-  double lateral_m = 0.0;  ///< distance from the insertion axis
+  double lateral_m = 0.0;  ///< the larger of the distances along the two axes across the insertion
   double angle_rad = 0.0;  ///< between the frames
 };
 

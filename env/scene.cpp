@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "env/gripper.h"
 #include "env/physics_model.h"
+#include "env/randomization.h"
 #include "env/scene_decor.h"
 #include "env/urdf_to_mjcf.h"
 
@@ -271,6 +272,7 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   scene.drawn_model = std::shared_ptr<const mjModel>(CompileMjcf(scene.xml, where).release(), ModelDeleter());
   scene.model = CompilePhysicsModel(scene.xml, scene.drawn_model, Scene::kLidGroup, where);
   scene.flange_T_tool = task.flange_T_tool;
+  scene.randomization = ReadRandomization(*scene.drawn_model, where);
   Index(robot.joints, robot.root_body->Attribute("name"), scene);
   constexpr double kQuarter = 0.5 * std::numbers::pi;
   scene.home_q_rad << 0.0, -kQuarter, kQuarter, -kQuarter, -kQuarter, 0.0;
@@ -304,7 +306,8 @@ void ResetScene(const Scene& scene, const JointVector& q_rad, mjData& data) {
   mj_resetData(scene.model.get(), &data);
   SetJointPositions(scene, q_rad, data);
   SetTargetPose(scene, scene.task.world_T_target, data);
-  mj_forward(scene.model.get(), &data);
+  mj_fwdPosition(scene.model.get(), &data);
+  mj_fwdVelocity(scene.model.get(), &data);
 }
 
 void CopyForDrawing(const Scene& scene, const mjData& state, mjData& drawn) {

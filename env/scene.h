@@ -32,6 +32,21 @@ struct SceneOptions {
   int max_contacts = 100;         ///< nconmax
 };
 
+/// A range of values; a draw is uniform in it.
+struct Range {
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// What differs from episode to episode, as the task file gives it (`feeler_random_*`). The default: nothing.
+struct Randomization {
+  Range contact_friction{1.0, 1.0};  ///< factor on the sliding friction of all contacts
+  Range clearance_m;                 ///< added on each side of the tool across the insertion; negative: a tighter fit
+  Range yaw_rad;                     ///< error of the target's orientation about the insertion axis
+  Range tool_mass{1.0, 1.0};         ///< factor on mass and inertia of the tool
+  Range force_bias_n;                ///< of the force sensor, per axis
+};
+
 /// Large joints 3 Nm, wrists 1.2 Nm.
 inline constexpr std::array<double, kJointCount> kRealisticJointFriction = {3.0, 3.0, 3.0, 1.2, 1.2, 1.2};
 
@@ -48,6 +63,7 @@ struct Scene {
   static constexpr int kLidGroup = 4;
 
   Task task;
+  Randomization randomization;
   std::shared_ptr<const mjModel> model;  ///< for physics: only what can touch, and the lids
   /// For pictures: with all that is only seen. Same bodies and joints; geoms have other numbers. CopyForDrawing.
   std::shared_ptr<const mjModel> drawn_model;
@@ -87,7 +103,8 @@ Scene BuildScene(const TaskModel& task, const SceneOptions& options = {});
 Scene BuildScene(const Task& task, const std::string& task_xml, const std::string& models_folder,
                  const SceneOptions& options = {});
 
-/// Joints at `q_rad`, at rest, target at its nominal pose, time zero, all else cleared; kinematics up to date.
+/// Joints at `q_rad`, at rest, target at its nominal pose, time zero, all else cleared; positions, contacts and
+/// velocities up to date, forces not yet.
 void ResetScene(const Scene& scene, const JointVector& q_rad, mjData& data);
 
 /// The state of physics into data of `scene.drawn_model`, ready for a Renderer.

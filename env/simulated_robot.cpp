@@ -47,10 +47,12 @@ SimulatedRobot::SimulatedRobot(std::shared_ptr<const Scene> scene, const RobotOp
 }
 
 void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target, const NoiseOptions& noise,
-                           RandomStream random) {
+                           RandomStream random, const PhysicsVariation& variation) {
   noise.Validate();
   RequirePose(world_T_target, "reset");
-  world_.Reset(q_rad, world_T_target, noise.joint_friction_nm);
+  PhysicsVariation physics = variation;
+  physics.joint_friction_nm += noise.joint_friction_nm;
+  world_.Reset(q_rad, world_T_target, physics);
   noise_ = noise;
   target_candidates_ = {world_.scene().task.world_T_target};
   transfer_seed_ = random.Next();
@@ -58,6 +60,9 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
     encoder_offset_[i] = noise.encoder_noise_rad > 0 ? noise.encoder_noise_rad * random.Normal() : 0.0;
   }
   sensor_ = ContactSensor(world_.scene(), noise, random);
+  encoder_random_ = RandomStream(random.Next(), 0, "encoder");
+  deflection_.setZero();
+  Sense();
   friction_.Reset();
   statistics_ = {};
   set_point_.reset();
@@ -80,15 +85,55 @@ void SimulatedRobot::SetObserver(std::function<void(const World&)> observer, dou
   next_observation_s_ = world_.time_s();
 }
 
-Pose SimulatedRobot::ToolPose() const { return MeasuredTool(q_rad()); }
+RobotState SimulatedRobot::Save() const {
+  return {world_.Save(),  noise_,           sensor_,         friction_,   statistics_, target_candidates_,
+          transfer_seed_, encoder_random_,  encoder_offset_, deflection_, measured_q_, held_orientation_,
+          set_point_,     tool_at_sensing_, peak_force_n_,   deadline_s_};
+}
+
+void SimulatedRobot::Restore(const RobotState& s) {
+  world_.Restore(s.world);
+  noise_ = s.noise;
+  sensor_ = s.sensor;
+  friction_ = s.friction;
+  statistics_ = s.statistics;
+  target_candidates_ = s.target_candidates;
+  transfer_seed_ = s.transfer_seed;
+  encoder_random_ = s.encoder_random;
+  encoder_offset_ = s.encoder_offset;
+  deflection_ = s.deflection;
+  measured_q_ = s.measured_q;
+  frame_ = ToolKinematics(world_.scene(), measured_q_);
+  held_orientation_ = s.held_orientation;
+  set_point_ = s.set_point;
+  tool_at_sensing_ = s.tool_at_sensing;
+  peak_force_n_ = s.peak_force_n;
+  deadline_s_ = s.deadline_s;
+  next_observation_s_ = world_.time_s();
+}
+
+Pose SimulatedRobot::ToolPose() const { return frame_.pose; }
+
+void SimulatedRobot::Sense() {
+  measured_q_ = world_.q_rad() + encoder_offset_ + deflection_;
+  for (int i = 0; i < kJointCount && noise_.encoder_jitter_rad > 0; ++i) {
+    measured_q_[i] += noise_.encoder_jitter_rad * encoder_random_.Normal();
+  }
+  frame_ = ToolKinematics(world_.scene(), measured_q_);
+}
 
 void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
-  const JointVector q = q_rad();
-  const Matrix6 jacobian = ToolJacobian(world_.scene(), q);
-  const Pose before = MeasuredTool(q);
+  const Matrix6 jacobian = frame_.jacobian;
+  const Pose before = frame_.pose;
   friction_.BeforeStep(world_.qd_rad_s(), world_.BiasTorque());
   world_.Step(torque_nm - friction_.estimate_nm());
   sensor_.Update(world_);
+  if (noise_.joint_stiffness_nm_rad > 0) {
+    constexpr double kLag_s = 0.02;
+    const JointVector load = world_.applied_torque_nm() + friction_.estimate_nm() - world_.BiasTorque();
+    deflection_ += world_.timestep_s() / kLag_s * (load / noise_.joint_stiffness_nm_rad - deflection_);
+  }
+  Sense();
   friction_.AfterStep(world_, world_.qd_rad_s(), sensor_.raw(), jacobian);
 
   ++statistics_.steps;
@@ -155,7 +200,7 @@ void SimulatedRobot::Hold(MotionResult& result) {
   here.q_rad = q_rad();
   for (double t = 0; t < options_.settle_time_limit_s; t += world_.timestep_s()) {
     TrackStep(here);
-    const Vector6 twist = ToolJacobian(world_.scene(), q_rad()) * world_.qd_rad_s();
+    const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
     if (t > 0.01 && twist.head<3>().norm() < options_.settle_speed_m_s) break;
   }
   if (result.reason == StopReason::kReached) result.world_T_tool = ToolPose();
@@ -170,7 +215,7 @@ MotionResult SimulatedRobot::Follow(double duration_s, const ReferenceAt& refere
   for (;;) {
     const double t = world_.time_s() - start_s;
     if (t >= duration_s) {
-      const Vector6 twist = ToolJacobian(world_.scene(), q_rad()) * world_.qd_rad_s();
+      const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
       const auto goal = reference_at(duration_s);
       const double error_m = goal ? (MeasuredTool(goal->q_rad).translation() - ToolPose().translation()).norm() : 0.0;
       const bool settled = error_m < options_.settle_error_m && twist.head<3>().norm() < options_.settle_speed_m_s;
@@ -389,7 +434,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
             t >= motion.time_limit_s ? "the time limit of the motion is over" : "the time of the episode is over";
         break;
       }
-      StepOnce(CartesianImpedance(world_, q_rad(), world_.qd_rad_s(), trajectory.At(t), gains));
+      StepOnce(CartesianImpedance(world_, frame_, world_.qd_rad_s(), trajectory.At(t), gains));
       if (sensor_.filtered().force_n.norm() > motion.force_limit_n ||
           sensor_.ArmForce() > options_.protective_force_n) {
         const bool arm = sensor_.ArmForce() > options_.protective_force_n;
@@ -399,7 +444,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
         break;
       }
       if (t >= trajectory.duration_s()) {
-        const Vector6 twist = ToolJacobian(world_.scene(), q_rad()) * world_.qd_rad_s();
+        const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
         resting_s = twist.head<3>().norm() < options_.settle_speed_m_s ? resting_s + world_.timestep_s() : 0.0;
         if (resting_s >= kRestTime_s) {
           const bool there = (ToolPose().translation() - goal.translation()).norm() <= options_.compliant_reach_m;
@@ -448,7 +493,7 @@ MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const Impeda
         result.reason = StopReason::kTimeLimit;
         break;
       }
-      StepOnce(CartesianImpedance(world_, q_rad(), world_.qd_rad_s(), reference, gains));
+      StepOnce(CartesianImpedance(world_, frame_, world_.qd_rad_s(), reference, gains));
     }
     result.contact = sensor_.ToolFlag();
     result.world_T_tool = ToolPose();

@@ -12,6 +12,7 @@
 #include "core/robot.h"
 #include "env/control/impedance.h"
 #include "env/control/joint_control.h"
+#include "env/control/tool_kinematics.h"
 #include "env/control/trajectory.h"
 #include "env/scene.h"
 #include "env/sensing/contact_sensor.h"
@@ -52,6 +53,26 @@ struct RobotStatistics {
   int steps = 0;               ///< physics steps
 };
 
+/// Everything that later calls depend on: restored, the robot goes on bit for bit.
+struct RobotState {
+  WorldState world;
+  NoiseOptions noise;
+  ContactSensor sensor;
+  FrictionObserver friction;
+  RobotStatistics statistics;
+  std::vector<Pose> target_candidates;
+  std::uint64_t transfer_seed = 0;
+  RandomStream encoder_random;
+  JointVector encoder_offset = JointVector::Zero();
+  JointVector deflection = JointVector::Zero();
+  JointVector measured_q = JointVector::Zero();
+  Eigen::Matrix3d held_orientation = Eigen::Matrix3d::Identity();
+  std::optional<Pose> set_point;
+  Pose tool_at_sensing = Pose::Identity();
+  double peak_force_n = 0.0;
+  double deadline_s = 0.0;
+};
+
 /// The UR10e in MuJoCo behind the robot interface.
 ///
 /// Guarded and linear motions and transfers are computed-torque control at every physics step; compliant motions are
@@ -69,7 +90,9 @@ class SimulatedRobot : public Robot {
   explicit SimulatedRobot(std::shared_ptr<const Scene> scene, const RobotOptions& options = {});
 
   /// Robot at rest at `q_rad`, target at its true pose, time zero; `random` drives the noise. Erases the past.
-  void Reset(const JointVector& q_rad, const Pose& world_T_target, const NoiseOptions& noise, RandomStream random);
+  /// The joint friction of `noise` is added to that of `variation`.
+  void Reset(const JointVector& q_rad, const Pose& world_T_target, const NoiseOptions& noise, RandomStream random,
+             const PhysicsVariation& variation = {});
 
   // Robot:
   Pose ToolPose() const override;
@@ -86,8 +109,13 @@ class SimulatedRobot : public Robot {
   /// motion and stays within 20 mm and 0.1 rad of the tool.
   MotionResult Servo(const Vector6& delta, int steps, const ImpedanceGains& gains = {});
 
+  /// Between motions. The observer is not part of the state.
+  RobotState Save() const;
+  /// Throws InputError for the state of another model; the robot is then as it was.
+  void Restore(const RobotState& state);
+
   /// As measured by the encoders.
-  JointVector q_rad() const { return world_.q_rad() + encoder_offset_; }
+  const JointVector& q_rad() const { return measured_q_; }
   JointVector qd_rad_s() const { return world_.qd_rad_s(); }
   const World& world() const { return world_; }
   const ContactSensor& sensor() const { return sensor_; }
@@ -118,6 +146,8 @@ class SimulatedRobot : public Robot {
   /// The way points of a transfer; empty, with the reason, when there are none.
   std::vector<Eigen::VectorXd> PlanWay(const Pose& world_T_tool, std::string& reason);
   void TrackStep(const JointReference& reference);
+  /// Reads the encoders.
+  void Sense();
   void StepOnce(const JointVector& torque_nm);
   bool IsContact(const Watch& watch, bool& released) const;
   /// The end of a motion that did not begin: world failed or time over.
@@ -135,7 +165,11 @@ class SimulatedRobot : public Robot {
   std::vector<Pose> target_candidates_;
   std::uint64_t transfer_seed_ = 0;
   std::unique_ptr<TransferChecker> transfer_checker_;  ///< made when first needed
+  RandomStream encoder_random_{0, 0, "encoder"};
   JointVector encoder_offset_ = JointVector::Zero();
+  JointVector deflection_ = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
+  JointVector measured_q_ = JointVector::Zero();
+  ToolFrame frame_;                                                 ///< of the tool, at measured_q_
   Eigen::Matrix3d held_orientation_ = Eigen::Matrix3d::Identity();  ///< what guarded moves hold
   std::optional<Pose> set_point_;                                   ///< of Servo
   Pose tool_at_sensing_ = Pose::Identity();  ///< measured pose in the state that the sensor describes

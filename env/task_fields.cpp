@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "env/randomization.h"
 
 namespace feeler::env {
 namespace {
@@ -96,7 +97,7 @@ class Fields {
   /// A misspelt optional field would otherwise be ignored in silence.
   template <class Known>
   void CheckKnown(std::string_view name, const Known& known, const char* element) const {
-    if (!name.starts_with("feeler_")) return;
+    if (!name.starts_with("feeler_") || IsRandomizationField(name)) return;
     if (std::find(known.begin(), known.end(), name) == known.end()) {
       Fail(element, std::string(name), "is not a field of a task", "the fields are listed in docs/task-file.md");
     }
@@ -265,6 +266,7 @@ Task ReadTaskFields(const mjModel& model, const std::string& where) {
   ReadAxes(fields, task);
   ReadMotion(fields, task);
   ReadVerdict(fields, task);
+  ReadRandomization(model, where);  // for its errors; the scene reads the ranges
   return task;
 }
 

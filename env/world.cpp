@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "env/physics_variation.h"
 
 namespace feeler::env {
 namespace {
@@ -20,47 +21,56 @@ bool AllBelow(const double* values, int count, double limit) {
   return std::all_of(values, values + count, [limit](double v) { return std::abs(v) < limit; });
 }
 
+// FNV-1a over what tells one scene from another.
+std::uint64_t Fingerprint(const mjModel& m) {
+  std::uint64_t hash = 14695981039346656037U;
+  const auto add = [&hash](const void* data, std::size_t bytes) {
+    for (const auto* byte = static_cast<const unsigned char*>(data); bytes > 0; ++byte, --bytes) {
+      hash = (hash ^ *byte) * 1099511628211U;
+    }
+  };
+  const auto count = [](int n) { return static_cast<std::size_t>(n); };
+  add(m.geom_type, count(m.ngeom) * sizeof(int));
+  add(m.geom_size, count(3 * m.ngeom) * sizeof(mjtNum));
+  add(m.geom_pos, count(3 * m.ngeom) * sizeof(mjtNum));
+  add(m.body_pos, count(3 * m.nbody) * sizeof(mjtNum));
+  add(m.body_mass, count(m.nbody) * sizeof(mjtNum));
+  add(m.mesh_vert, count(3 * m.nmeshvert) * sizeof(float));
+  add(&m.opt.timestep, sizeof(mjtNum));
+  return hash;
+}
+
 std::vector<double> Copy(const double* values, int count) { return {values, values + count}; }
 
 }  // namespace
 
-World::World(std::shared_ptr<const Scene> scene) : scene_(std::move(scene)), model_(scene_->model) {
+World::World(std::shared_ptr<const Scene> scene)
+    : scene_(std::move(scene)), model_(scene_->model), fingerprint_(Fingerprint(*model_)) {
   RouteMujocoMessages();
   data_ = MakeData(*model_);
   contacts_.reserve(static_cast<std::size_t>(std::max(model_->nconmax, 0)));
   Reset(scene_->home_q_rad, scene_->task.world_T_target);
 }
 
-void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const JointVector& joint_friction_nm) {
+void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const PhysicsVariation& variation) {
   if (!q_rad.allFinite()) throw InputError("reset", "joint position is not finite", "give six angles in radians");
   if (!world_T_target.matrix().allFinite()) throw InputError("reset", "target pose is not finite");
-  if (!joint_friction_nm.allFinite() || joint_friction_nm.minCoeff() < 0) {
-    throw InputError("reset", "joint friction is negative or not finite", "give Nm, zero or more");
-  }
-  UseFriction(joint_friction_nm);
+  Vary(variation);
   failure_.clear();
   contacts_.clear();
   applied_torque_.setZero();
-  ResetScene(*scene_, q_rad, *data_);
+  mj_resetData(model_.get(), data_.get());
+  SetJointPositions(*scene_, q_rad, *data_);
   SetTargetPose(*scene_, world_T_target, *data_);
   UpdatePositions();
   tool_at_contact_ = ToolPose();
   CheckSound();
 }
 
-void World::UseFriction(const JointVector& joint_friction_nm) {
-  if (joint_friction_nm == friction_) return;
-  // Sizes do not depend on friction, so the data serves every copy.
-  if (joint_friction_nm.isZero(0.0)) {
-    model_ = scene_->model;
-  } else {
-    ModelHandle copy(mj_copyModel(nullptr, scene_->model.get()));
-    for (int i = 0; i < kJointCount; ++i) {
-      copy->dof_frictionloss[scene_->dof[static_cast<std::size_t>(i)]] += joint_friction_nm[i];
-    }
-    model_ = std::move(copy);
-  }
-  friction_ = joint_friction_nm;
+void World::Vary(const PhysicsVariation& variation) {
+  if (variation == variation_) return;
+  model_ = VariedModel(*scene_, variation);
+  variation_ = variation;
 }
 
 void World::UpdatePositions() {
@@ -159,20 +169,24 @@ WorldState World::Save() const {
   s.mocap_pos = Copy(data_->mocap_pos, 3 * model_->nmocap);
   s.mocap_quat = Copy(data_->mocap_quat, 4 * model_->nmocap);
   s.contacts = contacts_;
-  s.joint_friction_nm = friction_;
+  s.tool_at_contact = tool_at_contact_;
+  s.applied_torque_nm = applied_torque_;
+  s.variation = variation_;
+  s.model = fingerprint_;
   return s;
 }
 
 void World::Restore(const WorldState& s) {
   const auto fits = [](const std::vector<double>& v, int n) { return v.size() == static_cast<std::size_t>(n); };
-  if (!fits(s.qpos, model_->nq) || !fits(s.qvel, model_->nv) || !fits(s.warmstart, model_->nv) ||
-      !fits(s.mocap_pos, 3 * model_->nmocap) || !fits(s.mocap_quat, 4 * model_->nmocap)) {
+  if (s.model != fingerprint_ || !fits(s.qpos, model_->nq) || !fits(s.qvel, model_->nv) ||
+      !fits(s.warmstart, model_->nv) || !fits(s.mocap_pos, 3 * model_->nmocap) ||
+      !fits(s.mocap_quat, 4 * model_->nmocap)) {
     throw InputError("restore", "the state belongs to another model", "restore only what this scene saved");
   }
   if (!AllBelow(s.qpos.data(), model_->nq, kAbsurdVelocity) || !AllBelow(s.qvel.data(), model_->nv, kAbsurdVelocity)) {
     throw InputError("restore", "the state holds absurd positions or velocities", "restore only what this scene saved");
   }
-  UseFriction(s.joint_friction_nm);
+  Vary(s.variation);
   mj_resetData(model_.get(), data_.get());
   failure_.clear();
   data_->time = s.time_s;
@@ -182,8 +196,9 @@ void World::Restore(const WorldState& s) {
   std::copy(s.mocap_pos.begin(), s.mocap_pos.end(), data_->mocap_pos);
   std::copy(s.mocap_quat.begin(), s.mocap_quat.end(), data_->mocap_quat);
   contacts_ = s.contacts;
+  applied_torque_ = s.applied_torque_nm;
   UpdatePositions();
-  tool_at_contact_ = ToolPose();
+  tool_at_contact_ = s.tool_at_contact;
   CheckSound();
 }
 

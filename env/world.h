@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "core/pose.h"
 #include "env/mujoco_handles.h"
+#include "env/physics_variation.h"
 #include "env/scene.h"
 
 namespace feeler::env {
@@ -26,7 +28,10 @@ struct WorldState {
   double time_s = 0.0;
   std::vector<double> qpos, qvel, warmstart, mocap_pos, mocap_quat;
   std::vector<ContactForce> contacts;
-  JointVector joint_friction_nm = JointVector::Zero();
+  Pose tool_at_contact = Pose::Identity();
+  JointVector applied_torque_nm = JointVector::Zero();
+  PhysicsVariation variation;
+  std::uint64_t model = 0;  ///< fingerprint of the scene's model
 };
 
 /// The physics of one episode: an mjData over a shared, constant scene.
@@ -44,10 +49,9 @@ class World {
  public:
   explicit World(std::shared_ptr<const Scene> scene);
 
-  /// Robot at rest at `q_rad`, target at its pose, time zero. `joint_friction_nm`: Coulomb friction of each joint.
-  /// Throws InputError for numbers that are not finite or a negative friction.
-  void Reset(const JointVector& q_rad, const Pose& world_T_target,
-             const JointVector& joint_friction_nm = JointVector::Zero());
+  /// Robot at rest at `q_rad`, target at its pose, time zero.
+  /// Throws InputError for numbers that are not finite and for variations that the tool's geometry does not allow.
+  void Reset(const JointVector& q_rad, const Pose& world_T_target, const PhysicsVariation& variation = {});
 
   /// Applies the torques (clamped to the limits of the joints) for one time step.
   /// Throws WorldError when the physics fails; then only Reset helps.
@@ -72,6 +76,7 @@ class World {
   Eigen::Matrix<double, 6, 6> Inertia() const;
   /// The torques of the last step, after clamping.
   const JointVector& applied_torque_nm() const { return applied_torque_; }
+  const PhysicsVariation& variation() const { return variation_; }
   /// Why the world failed; empty while it is sound.
   const std::string& failure() const { return failure_; }
 
@@ -80,19 +85,20 @@ class World {
   void Restore(const WorldState& state);
 
  private:
-  void UseFriction(const JointVector& joint_friction_nm);
+  void Vary(const PhysicsVariation& variation);
   void UpdatePositions();
   void GatherContacts();
   void CheckSound();
   [[noreturn]] void Fail(const std::string& what);
 
   std::shared_ptr<const Scene> scene_;
-  std::shared_ptr<const mjModel> model_;  ///< the scene's, or a copy of it with this episode's joint friction
+  std::shared_ptr<const mjModel> model_;  ///< the scene's, or a copy of it with this episode's variation
   DataHandle data_;
   std::vector<ContactForce> contacts_;
   Pose tool_at_contact_ = Pose::Identity();
   JointVector applied_torque_ = JointVector::Zero();
-  JointVector friction_ = JointVector::Zero();
+  PhysicsVariation variation_;
+  std::uint64_t fingerprint_ = 0;
   std::string failure_;
 };
 

@@ -7,17 +7,20 @@
 
 namespace feeler::env {
 
-JointVector CartesianImpedance(const World& world, const JointVector& q_rad, const JointVector& qd_rad_s,
+JointVector CartesianImpedance(const World& world, const ToolFrame& frame, const JointVector& qd_rad_s,
                                const PosePoint& reference, const ImpedanceGains& gains) {
-  const Pose tool = ToolForwardKinematics(world.scene(), q_rad);
-  const Matrix6 jacobian = ToolJacobian(world.scene(), q_rad);
+  const Pose& tool = frame.pose;
+  const Matrix6& jacobian = frame.jacobian;
   const Eigen::Matrix3d to_tool = tool.linear().transpose();
 
   Matrix6 tool_jacobian;  // the same, in tool axes
   tool_jacobian.topRows<3>() = to_tool * jacobian.topRows<3>();
   tool_jacobian.bottomRows<3>() = to_tool * jacobian.bottomRows<3>();
-  // Mobility of the tool axes; its inverse diagonal is the inertia felt along one axis while the others are free.
-  const Matrix6 mobility = tool_jacobian * world.Inertia().llt().solve(tool_jacobian.transpose());
+  // Mobility of the tool axes, J M^-1 J^T; the inverse of its diagonal is the inertia felt along one axis while the
+  // others are free. With M = L L^T the diagonal is the squared norms of the columns of L^-1 J^T.
+  Matrix6 half = tool_jacobian.transpose();
+  world.Inertia().llt().matrixL().solveInPlace(half);
+  const Vector6 mobility = half.colwise().squaredNorm();
 
   const Vector6 error = PoseError(tool, reference.pose);
   const Vector6 twist_error = reference.twist - jacobian * qd_rad_s;
@@ -28,13 +31,16 @@ JointVector CartesianImpedance(const World& world, const JointVector& q_rad, con
 
   Vector6 wrench;
   for (int i = 0; i < 6; ++i) {
-    const double damping = 2 * gains.damping_ratio * std::sqrt(stiffness[i] / std::max(mobility(i, i), 1e-6));
+    const double damping = 2 * gains.damping_ratio * std::sqrt(stiffness[i] / std::max(mobility[i], 1e-6));
     wrench[i] = stiffness[i] * local_error[i] + damping * local_twist[i];
   }
   // Without the inertia the coupling between the axes throws the tool sideways whenever the reference speeds up or
   // stops.
-  const JointVector acceleration = jacobian.partialPivLu().solve(reference.acceleration);
-  return tool_jacobian.transpose() * wrench + world.InertiaTimes(acceleration) + world.BiasTorque();
+  JointVector torque_nm = tool_jacobian.transpose() * wrench + world.BiasTorque();
+  if (!reference.acceleration.isZero(0.0)) {
+    torque_nm += world.InertiaTimes(jacobian.partialPivLu().solve(reference.acceleration));
+  }
+  return torque_nm;
 }
 
 }  // namespace feeler::env

@@ -16,9 +16,9 @@ struct ImpedanceGains {
 };
 
 /// Cartesian impedance without inertia shaping (Hogan 1985): J^T (K error + D velocity error) + M J^-1 reference
-/// acceleration + bias. D is the critical
-/// damping of each tool axis on its own, from the inertia the arm shows along it at present.
-JointVector CartesianImpedance(const World& world, const JointVector& q_rad, const JointVector& qd_rad_s,
+/// acceleration + bias. D is the critical damping of each tool axis on its own, from the inertia the arm shows along it
+/// at present. `frame`: ToolKinematics of the measured joints.
+JointVector CartesianImpedance(const World& world, const ToolFrame& frame, const JointVector& qd_rad_s,
                                const PosePoint& reference, const ImpedanceGains& gains);
 
 }  // namespace feeler::env

@@ -6,15 +6,15 @@
 
 namespace feeler::env {
 
-Matrix6 ToolJacobian(const Scene& scene, const JointVector& q_rad) {
-  Matrix6 jacobian = Jacobian(q_rad);
-  const Eigen::Vector3d lever = ForwardKinematics(q_rad).linear() * scene.flange_T_tool.translation();
-  for (int i = 0; i < 6; ++i) {
-    const Eigen::Vector3d angular = jacobian.col(i).tail<3>();
-    jacobian.col(i).head<3>() += angular.cross(lever);
-  }
-  return jacobian;
+ToolFrame ToolKinematics(const Scene& scene, const JointVector& q_rad) {
+  const KinematicChain chain = Chain(q_rad);
+  ToolFrame tool;
+  tool.pose = chain.base_T_flange * scene.flange_T_tool;
+  tool.jacobian = JacobianAt(chain, tool.pose.translation());
+  return tool;
 }
+
+Matrix6 ToolJacobian(const Scene& scene, const JointVector& q_rad) { return ToolKinematics(scene, q_rad).jacobian; }
 
 Vector6 PoseError(const Pose& from, const Pose& to) {
   Vector6 error;
@@ -35,12 +35,13 @@ bool SolveNearby(const Scene& scene, const Pose& world_T_tool, JointVector& q_ra
   constexpr double kTolerance = 1e-10;
   JointVector q = q_rad;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const Vector6 error = PoseError(ToolForwardKinematics(scene, q), world_T_tool);
+    const ToolFrame tool = ToolKinematics(scene, q);
+    const Vector6 error = PoseError(tool.pose, world_T_tool);
     if (error.cwiseAbs().maxCoeff() < kTolerance) {
       q_rad = q;
       return true;
     }
-    q += ToolJacobian(scene, q).partialPivLu().solve(error);
+    q += tool.jacobian.partialPivLu().solve(error);
     if (!q.allFinite() || (q - q_rad).cwiseAbs().maxCoeff() > max_change_rad) return false;
     if (q.cwiseAbs().maxCoeff() > 2 * M_PI) return false;
   }

@@ -11,6 +11,13 @@ namespace feeler::env {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+/// Pose and Jacobian (as ToolJacobian) of the tool frame, for the price of one of them.
+struct ToolFrame {
+  Pose pose;
+  Matrix6 jacobian;
+};
+ToolFrame ToolKinematics(const Scene& scene, const JointVector& q_rad);
+
 /// Jacobian of the tool frame in the world: rows 0-2 linear velocity of the tool origin (m/rad), rows 3-5 angular.
 Matrix6 ToolJacobian(const Scene& scene, const JointVector& q_rad);
 

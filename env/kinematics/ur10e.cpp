@@ -60,26 +60,43 @@ double WrapAngle(double angle_rad) {
   return wrapped <= -std::numbers::pi ? std::numbers::pi : wrapped;
 }
 
-Pose ForwardKinematics(const JointVector& q_rad) {
-  Pose pose = Pose::Identity();
-  for (int i = 0; i < kJointCount; ++i) pose = pose * Link(kRows[static_cast<std::size_t>(i)], q_rad[i]);
-  return TurnBase(pose);
+KinematicChain Chain(const JointVector& q_rad) {
+  // The product of Link(row, q) written out: a turn about z, a shift along z and x, a quarter turn about x. Six of
+  // these run in every control step.
+  KinematicChain chain;
+  Eigen::Vector3d x(-1, 0, 0), y(0, -1, 0), z(0, 0, 1), p = Eigen::Vector3d::Zero();  // the base, turned
+  for (std::size_t i = 0; i < kJointCount; ++i) {
+    chain.axis[i] = z;
+    chain.origin_m[i] = p;
+    const Row& row = kRows[i];
+    const double c = std::cos(q_rad[static_cast<int>(i)]);
+    const double s = std::sin(q_rad[static_cast<int>(i)]);
+    const Eigen::Vector3d turned_x = c * x + s * y;
+    const Eigen::Vector3d turned_y = c * y - s * x;
+    p += row.d_m * z + row.a_m * turned_x;
+    x = turned_x;
+    y = row.cos_alpha * turned_y + row.sin_alpha * z;
+    z = row.cos_alpha * z - row.sin_alpha * turned_y;
+  }
+  chain.base_T_flange = Pose::Identity();
+  chain.base_T_flange.linear() << x, y, z;
+  chain.base_T_flange.translation() = p;
+  return chain;
 }
 
-Eigen::Matrix<double, 6, 6> Jacobian(const JointVector& q_rad) {
-  std::array<Eigen::Vector3d, kJointCount> axis;
-  std::array<Eigen::Vector3d, kJointCount> origin;
-  Pose pose = TurnBase(Pose::Identity());
-  for (std::size_t i = 0; i < kJointCount; ++i) {
-    axis[i] = pose.linear().col(2);
-    origin[i] = pose.translation();
-    pose = pose * Link(kRows[i], q_rad[static_cast<int>(i)]);
-  }
+Eigen::Matrix<double, 6, 6> JacobianAt(const KinematicChain& chain, const Eigen::Vector3d& point_m) {
   Eigen::Matrix<double, 6, 6> jacobian;
   for (std::size_t i = 0; i < kJointCount; ++i) {
-    jacobian.col(static_cast<int>(i)) << axis[i].cross(pose.translation() - origin[i]), axis[i];
+    jacobian.col(static_cast<int>(i)) << chain.axis[i].cross(point_m - chain.origin_m[i]), chain.axis[i];
   }
   return jacobian;
+}
+
+Pose ForwardKinematics(const JointVector& q_rad) { return Chain(q_rad).base_T_flange; }
+
+Eigen::Matrix<double, 6, 6> Jacobian(const JointVector& q_rad) {
+  const KinematicChain chain = Chain(q_rad);
+  return JacobianAt(chain, chain.base_T_flange.translation());
 }
 
 std::vector<JointVector> InverseKinematics(const Pose& base_T_flange, double wrist_3_if_singular_rad) {

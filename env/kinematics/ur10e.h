@@ -32,6 +32,18 @@ inline constexpr std::array<const char*, kJointCount> kJointNames = {
 /// `base_link` turned by pi about z.
 Pose ForwardKinematics(const JointVector& q_rad);
 
+/// Where the joints' axes are, in the base frame, and the flange behind them.
+struct KinematicChain {
+  std::array<Eigen::Vector3d, kJointCount> axis;      ///< unit vectors
+  std::array<Eigen::Vector3d, kJointCount> origin_m;  ///< a point on each
+  Pose base_T_flange;
+};
+KinematicChain Chain(const JointVector& q_rad);
+
+/// The geometric Jacobian of a point (base frame) that moves with the flange: rows 0-2 linear (m/rad), rows 3-5 angular
+/// (rad/rad).
+Eigen::Matrix<double, 6, 6> JacobianAt(const KinematicChain& chain, const Eigen::Vector3d& point_m);
+
 /// The geometric Jacobian of the flange origin in the base frame: rows 0-2 linear (m/rad), rows 3-5 angular (rad/rad).
 Eigen::Matrix<double, 6, 6> Jacobian(const JointVector& q_rad);
 

@@ -56,7 +56,7 @@ void LowPass::Shift(const Wrench& offset) {
 }
 
 ContactSensor::ContactSensor(const Scene& scene, const NoiseOptions& noise, RandomStream random)
-    : noise_(noise), random_(random), filter_(kFilter_s) {
+    : tool_body_(scene.tool_body), noise_(noise), random_(random), filter_(kFilter_s) {
   const mjModel& model = *scene.model;
   geom_.resize(static_cast<std::size_t>(model.ngeom));
   for (int g = 0; g < model.ngeom; ++g) {
@@ -67,6 +67,7 @@ ContactSensor::ContactSensor(const Scene& scene, const NoiseOptions& noise, Rand
     }
   }
   for (int i = 0; i < 3; ++i) bias_.force_n[i] = noise.force_bias_n > 0 ? noise.force_bias_n * random_.Normal() : 0.0;
+  bias_.force_n += noise.force_offset_n;
   const auto delay = static_cast<std::size_t>(std::lround(noise.force_delay_s / model.opt.timestep));
   delayed_.resize(delay);
 }
@@ -83,6 +84,23 @@ Wrench ContactSensor::Measure(const Wrench& exact) {
   w.force_n = Quantise(w.force_n, noise_.force_quantum_n) - offset_.force_n;
   w.torque_nm -= offset_.torque_nm;
   return w;
+}
+
+// Weight and inertia of the mass that compensation does not know of, as a point in the tool's centre of mass.
+Wrench ContactSensor::UnknownLoad(const World& world) {
+  const mjData& data = world.data();
+  const Eigen::Vector3d centre = Eigen::Map<const Eigen::Vector3d>(data.xipos + 3 * tool_body_);
+  mjtNum velocity[6];
+  mj_objectVelocity(&world.model(), &data, mjOBJ_BODY, tool_body_, velocity, 0);
+  const Eigen::Map<const Eigen::Vector3d> linear(velocity + 3);  // angular first; of the centre of mass
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+  if (tool_velocity_m_s_) acceleration = (linear - *tool_velocity_m_s_) / world.timestep_s();
+  tool_velocity_m_s_ = linear;
+  const Eigen::Map<const Eigen::Vector3d> gravity(world.model().opt.gravity);
+  Wrench load;
+  load.force_n = noise_.payload_error_kg * (gravity - acceleration);
+  load.torque_nm = (centre - world.ToolPose().translation()).cross(load.force_n);
+  return load;
 }
 
 void ContactSensor::Update(const World& world) {
@@ -116,7 +134,13 @@ void ContactSensor::Update(const World& world) {
     pair_filtered_[i] += gain * (pair_force_[i] - pair_filtered_[i]);
     pair_flag_[i].Update(pair_filtered_[i]);
   }
-  raw_ = Measure(exact_);
+  Wrench seen = exact_;
+  if (noise_.payload_error_kg != 0.0) {
+    const Wrench load = UnknownLoad(world);
+    seen.force_n += load.force_n;
+    seen.torque_nm += load.torque_nm;
+  }
+  raw_ = Measure(seen);
   filter_.Update(raw_, world.timestep_s());
 }
 

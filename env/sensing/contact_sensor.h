@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -79,12 +80,15 @@ class ContactSensor {
 
  private:
   Wrench Measure(const Wrench& exact);
+  Wrench UnknownLoad(const World& world);
 
   struct Side {
     ScenePart part = ScenePart::kEnvironment;
     bool beyond_sensor = false;
   };
   std::vector<Side> geom_;
+  int tool_body_ = -1;
+  std::optional<Eigen::Vector3d> tool_velocity_m_s_;  ///< of its centre of mass, after the last step
   NoiseOptions noise_;
   RandomStream random_;
   Wrench bias_;

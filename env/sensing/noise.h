@@ -16,8 +16,16 @@ struct NoiseOptions {
   double torque_noise_nm = 0.0;
   double force_bias_n = 0.0;  ///< standard deviation of a constant offset per axis, drawn once an episode
   double force_delay_s = 0.0;
-  double force_quantum_n = 0.0;      ///< resolution; 0: continuous
-  double encoder_noise_rad = 0.0;    ///< standard deviation of a constant offset per joint, drawn once an episode
+  double force_quantum_n = 0.0;                              ///< resolution; 0: continuous
+  Eigen::Vector3d force_offset_n = Eigen::Vector3d::Zero();  ///< a given constant offset, on top of the drawn one
+  /// Mass of the held tool that gravity and acceleration compensation does not know of (negative: counts too much). Its
+  /// weight and inertia stay in the readings; zeroing the wrench removes the weight.
+  double payload_error_kg = 0.0;
+  double encoder_noise_rad = 0.0;   ///< standard deviation of a constant offset per joint, drawn once an episode
+  double encoder_jitter_rad = 0.0;  ///< standard deviation of each reading
+  /// Stiffness of each joint between encoder and link, 0: rigid. The tool gives way under contact and the encoders do
+  /// not see it (quasi-static, with a lag of 20 ms; the sag under gravity counts as calibrated). A UR10e has some 5e4.
+  double joint_stiffness_nm_rad = 0.0;
   double contact_threshold_n = 5.0;  ///< what a guarded move needs to tell a contact from noise: advice to callers
 
   /// Throws InputError naming the field that is negative or not finite.

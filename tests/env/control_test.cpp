@@ -137,7 +137,8 @@ TEST_F(ControlTest, ImpedanceIsTheSpringItSaysInToolAxes) {
   const Eigen::Vector3d stretch(0.001, -0.002, 0.0005);  // in tool axes
   reference.pose.translation() += reference.pose.linear() * stretch;
   const JointVector torque =
-      CartesianImpedance(world_, world_.q_rad(), world_.qd_rad_s(), reference, gains) - world_.BiasTorque();
+      CartesianImpedance(world_, ToolKinematics(*scene_, world_.q_rad()), world_.qd_rad_s(), reference, gains) -
+      world_.BiasTorque();
   const Vector6 wrench = ToolJacobian(*scene_, start_).transpose().lu().solve(torque);
   const Eigen::Vector3d expected = world_.ToolPose().linear() * gains.stiffness_n_m.cwiseProduct(stretch);
   EXPECT_LT((wrench.head<3>() - expected).norm(), 1e-6);
@@ -146,7 +147,7 @@ TEST_F(ControlTest, ImpedanceIsTheSpringItSaysInToolAxes) {
 
 TEST_F(ControlTest, FrictionObserverFindsUnknownFriction) {
   const JointVector friction = Eigen::Map<const JointVector>(kRealisticJointFriction.data());
-  world_.Reset(start_, scene_->task.world_T_target, friction);
+  world_.Reset(start_, scene_->task.world_T_target, {.joint_friction_nm = friction});
   FrictionObserver observer;
   JointReference reference;
   const JointVector speed = JointVector::Constant(0.1);

@@ -64,7 +64,7 @@ TEST_F(WorldTest, ResetErasesThePast) {
   World fresh(scene_);
   fresh.Reset(start_, target_);
   World used(scene_);
-  used.Reset(scene_->home_q_rad, MakePose({0.7, 0.1, 0.2}, 0.3), JointVector::Constant(2.0));
+  used.Reset(scene_->home_q_rad, MakePose({0.7, 0.1, 0.2}, 0.3), {.joint_friction_nm = JointVector::Constant(2.0)});
   Trace(used, 50);
   used.Reset(start_, target_);
   EXPECT_EQ(Trace(fresh, 300), Trace(used, 300));
@@ -72,7 +72,7 @@ TEST_F(WorldTest, ResetErasesThePast) {
 
 TEST_F(WorldTest, SavedStateContinues) {
   World world(scene_);
-  world.Reset(start_, target_, JointVector::Constant(0.5));
+  world.Reset(start_, target_, {.joint_friction_nm = JointVector::Constant(0.5)});
   Trace(world, 150);
   const WorldState state = world.Save();
   const std::vector<double> continued = Trace(world, 150);
@@ -130,7 +130,7 @@ TEST_F(WorldTest, ForceOnTheToolBalancesThePush) {
 
 TEST_F(WorldTest, JointFrictionHoldsTheArm) {
   World world(scene_);
-  world.Reset(start_, target_, JointVector::Constant(3.0));
+  world.Reset(start_, target_, {.joint_friction_nm = JointVector::Constant(3.0)});
   for (int i = 0; i < 200; ++i) world.Step(world.BiasTorque() + JointVector::Constant(2.5));
   const double held_rad = (world.q_rad() - start_).norm();
   world.Reset(start_, target_);
@@ -199,7 +199,7 @@ TEST_F(WorldTest, UnstablePhysics) {
 TEST_F(WorldTest, BadResetIsRefused) {
   World world(scene_);
   EXPECT_THROW(world.Reset(JointVector::Constant(std::nan("")), target_), InputError);
-  EXPECT_THROW(world.Reset(start_, target_, JointVector::Constant(-1.0)), InputError);
+  EXPECT_THROW(world.Reset(start_, target_, {.joint_friction_nm = JointVector::Constant(-1.0)}), InputError);
   Pose nowhere = target_;
   nowhere.translation().x() = std::nan("");
   EXPECT_THROW(world.Reset(start_, nowhere), InputError);
