@@ -14,9 +14,11 @@ namespace feeler::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Stands for a certificate that does not exist; any number is a lower bound of it.
-constexpr float kNone = 4096.0F;
 constexpr int kFirstRadius = 48;
+/// Of rows of up to this many further members all are mates, of longer ones those within reach: certificates get weaker
+/// the more mates there are, but then more openings have to be looked into to leave a member without.
+constexpr int kWholeRow = 5;
+constexpr int kMateReach = 3;
 
 int Distance(const Cell& a, const Cell& b) { return (a - b).cwiseAbs().sum(); }
 int Distance(const Cell& a, const CellBox& box) { return Distance(a, box.Clamp(a)); }
@@ -47,14 +49,17 @@ struct OpenBound::Layer {
     Cell h;
     int mask = 0;                    ///< which of the neighbours +x, -x, +y, -y are members
     std::array<int, 4> neighbour{};  ///< their indices
+    std::array<int, 2> mates{};      ///< members of its row, of its column, within reach
     double off_path = kInfinity;     ///< least cost of looking into an opening off the main path
     double off_rest = kInfinity;     ///< the same from where the member leaves the main path
   };
   std::vector<Member> members;
   int orientation = 0;
-  int each = 1;                      ///< openings that can be looked into from one place
-  CellBox mouths;                    ///< of all members
-  double first = 0.0;                ///< no opening is looked into before
+  int each = 1;    ///< openings that can be looked into from one place
+  CellBox mouths;  ///< of all members
+  const MateCertificates::Table* mates = nullptr;
+  std::array<int, 2> alone_by_one{1, 1};  ///< to how many members without a mate left one opening can have contributed
+  double first = 0.0;                     ///< no opening is looked into before
   std::vector<double> slots;         ///< the k-th opening of the main path is looked into at this time at the earliest
   std::vector<double> slots_before;  ///< sums of the first k of them
   double outside = kInfinity;        ///< places of splits at least so far away are not looked at
@@ -75,7 +80,8 @@ OpenBound::OpenBound(const ContactMap& open, std::shared_ptr<const ContactMap> f
       masks_(masks),
       certificates_(std::move(certificates)),
       costs_(costs),
-      spread_(spread) {
+      spread_(spread),
+      mates_(filled_, costs, spread) {
   const CellBox& domain = open.domain();
   const CertificateGrid& grid = certificates_->grid();
   const double per_step = grid.unit / costs_.free;
@@ -113,7 +119,8 @@ OpenBound::OpenBound(const ContactMap& open, std::shared_ptr<const ContactMap> f
         }
         // The walk may begin in the middle of a motion, which has been paid for.
         const auto rest = static_cast<float>(per_step * (least - std::min<std::uint32_t>(least, grid.start_units)));
-        plane[i] = least == CertificateTable::kUnreachable ? kNone : std::min(rest, kNone);
+        plane[i] =
+            least == CertificateTable::kUnreachable ? MateCertificates::kNone : std::min(rest, MateCertificates::kNone);
       }
     }
   }
@@ -182,6 +189,28 @@ double OpenBound::LayerBound(const Bits256& bits, int orientation, const Cell& r
       member.neighbour[i] = index[static_cast<std::size_t>(at.x() + 16 * at.y())];
     }
   }
+  const CellBox members_box = Around(bits, {Cell::Zero(), Cell::Zero()});
+  std::array<int, 2> reach{};
+  for (int axis = 0; axis < 2; ++axis) {
+    const int span = members_box.max[axis] - members_box.min[axis];
+    reach[static_cast<std::size_t>(axis)] =
+        std::max(1, span - spread_[axis] <= kWholeRow ? span - spread_[axis] : kMateReach);
+    layer.alone_by_one[static_cast<std::size_t>(axis)] =
+        span <= reach[static_cast<std::size_t>(axis)] + spread_[axis] ? 1 : 2;
+  }
+  layer.mates = &mates_.Within(reach, orientation);
+  for (Layer::Member& member : layer.members) {
+    for (int axis = 0; axis < 2; ++axis) {
+      for (int i = 1; i <= reach[static_cast<std::size_t>(axis)]; ++i) {
+        for (const int sign : {-1, 1}) {
+          Cell at = member.h;
+          at[axis] += sign * (i + spread_[axis]);
+          if (at[axis] < 0 || at[axis] > 15 || !bits.Test(at.x() + 16 * at.y())) continue;
+          ++member.mates[static_cast<std::size_t>(axis)];
+        }
+      }
+    }
+  }
   for (const Layer::Member& member : layer.members) {
     if (filled_->Blocked(robot - member.h, orientation)) return 0.0;  // already inside an opening
   }
@@ -215,8 +244,8 @@ double OpenBound::LayerBound(const Bits256& bits, int orientation, const Cell& r
   double bound = all_looked_into;
   for (int radius = kFirstRadius;; radius *= 2) {
     // Where the radius takes in all that is not repeated beyond the map, nothing is left out.
-    const Cell reach = (box.max - robot).cwiseMax(Cell(robot - box.min));
-    const double outside = reach.sum() <= radius ? kInfinity : radius + 1.0;
+    const Cell furthest = (box.max - robot).cwiseMax(Cell(robot - box.min));
+    const double outside = furthest.sum() <= radius ? kInfinity : radius + 1.0;
     layer.outside = outside;
     std::unordered_map<std::uint32_t, Split> splits;
     std::vector<std::vector<Cell>> places(static_cast<std::size_t>(radius) + 1);
@@ -369,6 +398,50 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
     best_from_here = std::max(best_from_here, from_here[k]);
   }
 
+  // The same with mates for neighbours. A member is spared its certificate only if all its mates are looked into.
+  thread_local std::array<std::vector<double>, 2> mate_charge;
+  thread_local std::vector<double> mate_from_start;
+  thread_local std::vector<double> mate_from_here;
+  mate_from_start.resize(count);
+  mate_from_here.resize(count);
+  for (std::vector<double>& charges : mate_charge) charges.assign(count, 0.0);
+  double sum_mate_start = 0.0;
+  double sum_mate_here = 0.0;
+  double most_mate_here = 0.0;
+  double best_mate_start = 0.0;
+  double best_mate_here = 0.0;
+  std::array<double, 2> best_spared{};
+  for (std::size_t k = 0; k < count; ++k) {
+    const Layer::Member& member = layer.members[k];
+    const CertificateGrid& mate_grid = layer.mates->grid;
+    const std::size_t at = mate_grid.Index(candidate.place - member.h);
+    const double along_x = member.mates[0] > 0 ? layer.mates->planes[at] : 0.0;
+    const double along_y = member.mates[1] > 0 ? layer.mates->planes[mate_grid.cells + at] : 0.0;
+    double charges = 0.0;
+    if (along_x >= 0.0 && along_y >= 0.0 && along_x + along_y > 0.0) {
+      const double both = member.mates[0] == 0   ? along_y
+                          : member.mates[1] == 0 ? along_x
+                                                 : layer.mates->planes[2 * mate_grid.cells + at];
+      mate_charge[0][k] = std::min(along_x, both * along_x / (along_x + along_y));
+      mate_charge[1][k] = std::min(along_y, both - mate_charge[0][k]);
+      charges = mate_charge[0][k] + mate_charge[1][k];
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        if (member.mates[axis] == 0) continue;
+        best_spared[axis] =
+            std::max(best_spared[axis], layer.alone_by_one[axis] * mate_charge[axis][k] / member.mates[axis]);
+      }
+    }
+    mate_from_start[k] = std::min(std::max(member.off_path, way), way + charges);
+    mate_from_here[k] = std::min(member.off_rest, charges);
+    sum_mate_start += mate_from_start[k];
+    sum_mate_here += mate_from_here[k];
+    most_mate_here = std::max(most_mate_here, mate_from_here[k]);
+    best_mate_start = std::max(best_mate_start, mate_from_start[k]);
+    best_mate_here = std::max(best_mate_here, mate_from_here[k]);
+  }
+  best_mate_start += best_spared[0] + best_spared[1];
+  best_mate_here += best_spared[0] + best_spared[1];
+
   if (!refine) {
     double bound = kInfinity;
     for (std::size_t m = static_cast<std::size_t>(inside); m < count; ++m) {
@@ -384,7 +457,14 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
       const double b = static_cast<double>(rest) * time + scale * sum_from_here -
                        static_cast<double>(m) * best_from_here -
                        Savings(time + best_from_here - again, rest, layer.each);
-      bound = std::min(bound, early + std::max({a, b, static_cast<double>(rest) * time}));
+      const double mate_scale =
+          most_mate_here > 0.0 ? std::clamp((layer.outside - time) / most_mate_here, 0.0, 1.0) : 1.0;
+      const double c = sum_mate_start - static_cast<double>(m) * best_mate_start -
+                       Savings(best_mate_start - again, rest, layer.each);
+      const double d = static_cast<double>(rest) * time + mate_scale * sum_mate_here -
+                       static_cast<double>(m) * best_mate_here -
+                       Savings(time + best_mate_here - again, rest, layer.each);
+      bound = std::min(bound, early + std::max({a, b, c, d, static_cast<double>(rest) * time}));
       if (early > bound) break;
     }
     candidate.bound = std::max(candidate.bound, bound);
@@ -421,10 +501,12 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
     std::vector<double> sorted;
     std::vector<double> sums;
   };
-  std::array<Variant, 4> variants{{{&from_start, false, false, {}, {}},
+  std::array<Variant, 6> variants{{{&from_start, false, false, {}, {}},
                                    {&from_start, false, true, {}, {}},
                                    {&from_here, true, false, {}, {}},
-                                   {&from_here, true, true, {}, {}}}};
+                                   {&from_here, true, true, {}, {}},
+                                   {&mate_from_start, false, false, {}, {}},
+                                   {&mate_from_here, true, false, {}, {}}}};
   for (Variant& variant : variants) {
     variant.sorted = *variant.gains;
     if (variant.path) {
@@ -433,6 +515,34 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
     std::ranges::sort(variant.sorted, std::greater<>());
     variant.sums.push_back(0.0);
     for (const double gain : variant.sorted) variant.sums.push_back(variant.sums.back() + gain);
+  }
+  // What mates are spared at most when so many openings are looked into: each stands beside at most `alone_by_one`
+  // members without a mate left, and such a member needs all its mates looked into.
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    std::vector<std::pair<double, double>> items;  // what is spared per mate, mates
+    for (std::size_t k = 0; k < count; ++k) {
+      const double mates = layer.members[k].mates[axis];
+      if (mates > 0.0) items.emplace_back(mate_charge[axis][k] / mates, mates);
+    }
+    std::ranges::sort(items, std::greater<>());
+    std::size_t item = 0;
+    double used = 0.0;
+    double spared_so_far = 0.0;
+    for (std::size_t looks = 1; looks <= count; ++looks) {
+      double room = layer.alone_by_one[axis];
+      while (room > 0.0 && item < items.size()) {
+        const double take = std::min(room, items[item].second - used);
+        spared_so_far += take * items[item].first;
+        used += take;
+        room -= take;
+        if (used >= items[item].second) {
+          used = 0.0;
+          ++item;
+        }
+      }
+      variants[4].sums[looks] += spared_so_far;
+      variants[5].sums[looks] += spared_so_far;
+    }
   }
   double bound = kInfinity;
   for (std::size_t m = static_cast<std::size_t>(inside); m < count; ++m) {
@@ -443,6 +553,8 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
     const double time = std::max(way, delayed);
     const double again = std::max(time + to_mouths, layer.first + static_cast<int>(m) / layer.each);
     const double scale = most_from_here > 0.0 ? std::clamp((layer.outside - time) / most_from_here, 0.0, 1.0) : 1.0;
+    const double mate_scale =
+        most_mate_here > 0.0 ? std::clamp((layer.outside - time) / most_mate_here, 0.0, 1.0) : 1.0;
     // By the number of openings that are looked into in all.
     double late = 0.0;
     for (std::size_t looks = m; looks < count; ++looks) {
@@ -451,7 +563,10 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
       double best = early + least_rest;
       for (const Variant& variant : variants) {
         double rest = -variant.sums[looks] - (variant.path ? (m == 0 ? 1.0 : 2.0) * bonus : 0.0);
-        rest += variant.delayed ? static_cast<double>(count - looks) * time + scale * sum_from_here : sum_from_start;
+        const bool of_mates = variant.gains == &mate_from_start || variant.gains == &mate_from_here;
+        rest += !variant.delayed ? (of_mates ? sum_mate_start : sum_from_start)
+                                 : static_cast<double>(count - looks) * time +
+                                       (of_mates ? mate_scale * sum_mate_here : scale * sum_from_here);
         best = std::max(best, (variant.path ? early_on_path : early) + rest);
       }
       bound = std::min(bound, best + late);

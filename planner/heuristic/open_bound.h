@@ -14,6 +14,7 @@
 #include "planner/belief/hypothesis_sets.h"
 #include "planner/contact/contact_map.h"
 #include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/mate_certificates.h"
 
 namespace feeler::planner {
 
@@ -60,6 +61,7 @@ class OpenBound {
   std::shared_ptr<const CertificateTable> certificates_;
   StepCosts costs_;
   Cell spread_;
+  MateCertificates mates_;
   std::vector<Openings> openings_;  ///< per orientation
   /// Per orientation and subset of the neighbours along x and y (bits +x, -x, +y, -y): least certificate for one
   /// neighbour of each axis that the subset has, in free steps; negative where the filled target is.
