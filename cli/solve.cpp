@@ -109,6 +109,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     nlohmann::json pairs = nlohmann::json::array();
     for (const auto& [i, j] : result.indistinguishable) pairs.push_back({i, j});
     PrintJson({{"problem", problem.name},
+               {"opening", flags.task.empty() ? nlohmann::json() : nlohmann::json(flags.opening)},
                {"status", planner::ToString(result.status)},
                {"solver", planner::ToString(options.solver)},
                {"setting", flags.solver.setting},
