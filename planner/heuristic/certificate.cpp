@@ -83,8 +83,8 @@ double CertificateHeuristic::Slow(SetId set, const Cell& robot) {
   double sum = 0.0;
   std::size_t k = 0;
   sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
-    const std::uint16_t value = table_->At(robot - h, masks_[k++], orientation);
-    sum += value == CertificateTable::kUnreachable ? std::numeric_limits<double>::infinity()
+    const std::uint32_t value = table_->Further(robot - h, masks_[k++], orientation);
+    sum += value >= CertificateTable::kUnreachable ? std::numeric_limits<double>::infinity()
                                                    : sets_.Weight(layer, bit) * value;
   });
   return sum * table_->grid().unit;

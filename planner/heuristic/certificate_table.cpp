@@ -3,7 +3,7 @@
 namespace feeler::planner {
 
 CertificateTable::CertificateTable(const ContactMap& map, const StepCosts& costs, const Cell& spread)
-    : grid_(map, costs, spread + Cell::Ones()), orientations_(map.orientations()) {
+    : grid_(ActiveRegion(map), costs, spread + Cell::Ones()), orientations_(map.orientations()) {
   for (const Direction d : kDirections) {
     neighbours_[static_cast<std::size_t>(IndexOf(d))] = (spread[AxisOf(d)] + 1) * UnitCell(d);
   }

@@ -12,8 +12,8 @@
 namespace feeler::planner {
 
 /// For each displacement x of the tool and each subset M of the six neighbours h + e of a hypothesis h (e = +-(spread +
-/// 1) cells along an axis): the least cost of a walk of single steps from x, as the tool fares under h, that returns
-/// something else than it would under each neighbour in M.
+/// 1) cells along an axis): the least cost of a walk (of single steps, or of guarded moves: see StepCosts) from x, as
+/// the tool fares under h, that returns something else than it would under each neighbour in M.
 ///
 /// Why its mean over the hypotheses of a belief is a lower bound: under the true hypothesis h a policy is one walk, and
 /// when it ends every neighbour of h that was in the belief must have returned something else somewhere (neighbours are
@@ -35,6 +35,10 @@ class CertificateTable {
   const std::uint16_t* values() const { return values_.data(); }
   std::uint16_t At(const Cell& displacement, int mask, int orientation) const {
     return values_[static_cast<std::size_t>(orientation * kMasks + mask) * grid_.cells + grid_.Index(displacement)];
+  }
+  /// The same, with the way back to the grid; 0 for no neighbours.
+  std::uint32_t Further(const Cell& displacement, int mask, int orientation) const {
+    return At(displacement, mask, orientation) + (mask == 0 ? 0 : grid_.WayBack(displacement));
   }
   std::size_t bytes() const { return values_.size() * sizeof(values_[0]); }
 

@@ -93,10 +93,10 @@ double CuboidHeuristic::Value(const Box& box, const Cell& robot) const {
   for (std::uint32_t i = box.members.first; i < box.members.first + box.members.count; ++i) {
     const Single& single = singles_[i];
     const Cell displacement = robot - single.offset;
-    const std::uint16_t value = single.pair != nullptr
+    const std::uint32_t value = single.pair != nullptr
                                     ? single.pair->At(displacement)
-                                    : certificates_->At(displacement, single.mask, single.orientation);
-    if (value == kNoCertificate) return kInfinity;
+                                    : certificates_->Further(displacement, single.mask, single.orientation);
+    if (value >= kNoCertificate) return kInfinity;
     sum += single.weight * value * (single.pair != nullptr ? single.pair->grid.unit : certificates_->grid().unit);
   }
   return std::max(sum, units * cuboids_->unit());

@@ -10,27 +10,6 @@
 namespace feeler::planner {
 namespace {
 
-constexpr std::uint8_t kExcluded = 1U << kDirectionCount;
-
-/// The tool cannot be there: it overlaps the target, and no free step leads there (by rounding one may).
-bool OutOfReach(const ContactMap& map, const Cell& displacement, int orientation) {
-  if (!map.Blocked(displacement, orientation)) return false;
-  return std::ranges::none_of(kDirections, [&](Direction d) {
-    const Cell before = displacement - UnitCell(d);
-    return !map.Blocked(before, orientation) && map.StepFree(before, d, orientation);
-  });
-}
-
-/// Steps blocked from a displacement (bit per direction), or kExcluded.
-std::uint8_t FlagsAt(const ContactMap& map, const Cell& displacement, int orientation) {
-  if (OutOfReach(map, displacement, orientation)) return kExcluded;
-  unsigned flags = 0;
-  for (const Direction d : kDirections) {
-    if (!map.StepFree(displacement, d, orientation)) flags |= 1U << IndexOf(d);
-  }
-  return static_cast<std::uint8_t>(flags);
-}
-
 template <class F>
 void ForEachCell(const CellBox& box, F f) {
   for (int z = box.min.z(); z <= box.max.z(); ++z) {
@@ -38,12 +17,6 @@ void ForEachCell(const CellBox& box, F f) {
       for (int x = box.min.x(); x <= box.max.x(); ++x) f(Cell(x, y, z));
     }
   }
-}
-
-CellBox LayerOf(CellBox box, int axis, int at) {
-  box.min[axis] = at;
-  box.max[axis] = at;
-  return box;
 }
 
 /// Of a grid of `size` cells, x fastest.
@@ -88,11 +61,15 @@ struct CuboidTable::Scratch {
 CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
                          const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs)
     : spread_(spread), largest_(largest.cwiseMin(kLongest)) {
-  const CertificateGrid units(map, costs, Cell::Zero());
+  const TableUnits units(costs);
   unit_ = units.unit;
   free_units_ = units.free_units;
   contact_units_ = units.contact_units;
-  FindActiveBox(map);
+  const ActiveRegion region(map);
+  active_ = {region.box.min - Cell::Ones(), region.box.max + Cell::Ones()};
+  mirrored_ = region.mirrored;
+  free_above_ = region.free_above;
+  free_below_ = region.free_below;
   FillFlags(map);
   FitIntoMemory(map.orientations());
   planes_.resize(static_cast<std::size_t>(largest_.prod() * map.orientations()));
@@ -115,58 +92,10 @@ CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const
   }
 }
 
-void CuboidTable::FindActiveBox(const ContactMap& map) {
-  active_ = map.domain();
-  const auto same = [&](int axis, int at, int other) {
-    bool equal = true;
-    for (int o = 0; o < map.orientations() && equal; ++o) {
-      ForEachCell(LayerOf(active_, axis, at), [&](const Cell& here) {
-        Cell there = here;
-        there[axis] = other;
-        equal = equal && FlagsAt(map, here, o) == FlagsAt(map, there, o);
-      });
-    }
-    return equal;
-  };
-  const auto free = [&](int axis, int at) {
-    bool all = true;
-    for (int o = 0; o < map.orientations(); ++o) {
-      ForEachCell(LayerOf(active_, axis, at), [&](const Cell& here) { all = all && FlagsAt(map, here, o) == 0; });
-    }
-    return all;
-  };
-  for (int axis = 0; axis < 3; ++axis) {
-    while (active_.max[axis] > active_.min[axis] && same(axis, active_.max[axis], active_.max[axis] - 1)) {
-      --active_.max[axis];
-    }
-    while (active_.max[axis] > active_.min[axis] && same(axis, active_.min[axis], active_.min[axis] + 1)) {
-      ++active_.min[axis];
-    }
-  }
-  active_ = {active_.min - Cell::Ones(), active_.max + Cell::Ones()};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    free_above_[i] = free(axis, active_.max[axis]);
-    free_below_[i] = free(axis, active_.min[axis]);
-    mirrored_[i] = true;
-    for (int o = 0; o < map.orientations(); ++o) {
-      ForEachCell(active_, [&](const Cell& here) {
-        if (!mirrored_[i]) return;
-        Cell there = here;
-        there[axis] = active_.min[axis] + active_.max[axis] - here[axis];
-        const unsigned flags = FlagsAt(map, there, o);
-        unsigned back = flags & ~(3U << (2 * axis));
-        back |= (flags >> (2 * axis) & 1) << (2 * axis + 1) | (flags >> (2 * axis + 1) & 1) << (2 * axis);
-        mirrored_[i] = back == FlagsAt(map, here, o);
-      });
-    }
-  }
-}
-
 void CuboidTable::FillFlags(const ContactMap& map) {
   for (int o = 0; o < map.orientations(); ++o) {
     std::vector<std::uint8_t>& flags = flags_.emplace_back();
-    ForEachCell(active_, [&](const Cell& here) { flags.push_back(FlagsAt(map, here, o)); });
+    ForEachCell(active_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, o)); });
   }
 }
 
@@ -288,7 +217,7 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
   ForEachCell({Cell::Zero(), stored - Cell::Ones()}, [&](const Cell& cell) {
     const std::size_t here = at++;
     std::uint8_t& flags = scratch.flags[here];
-    if ((flags & kExcluded) != 0) {
+    if ((flags & kOutOfReach) != 0) {
       flags = 0x3F;
       return;
     }

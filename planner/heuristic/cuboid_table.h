@@ -62,7 +62,6 @@ class CuboidTable {
   }
   Plane Shape(const Cell& size) const;
   void FitIntoMemory(int orientations);
-  void FindActiveBox(const ContactMap& map);
   void FillFlags(const ContactMap& map);
   void Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch);
   /// The best bound of a set of hypotheses (`layers`, emptied) over the partitions of it.
@@ -82,7 +81,7 @@ class CuboidTable {
   double unit_ = 1.0;
   std::uint32_t free_units_ = 1;
   std::uint32_t contact_units_ = 0;
-  std::vector<std::vector<std::uint8_t>> flags_;  ///< per orientation and active displacement, see FillFlags
+  std::vector<std::vector<std::uint8_t>> flags_;  ///< per orientation and active displacement, see StepFlags
   std::vector<Plane> planes_;
 };
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "planner/heuristic/guarded_certificates.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -42,12 +44,59 @@ LocalCertificateTable::LocalCertificateTable(const Problem& problem, const StepC
     for (const auto& [distance, j] : nearest) others_[i].push_back(j);
   }
   // The units of the grid tables serve here too.
-  const CertificateGrid units(*problem.map, costs, Cell::Zero());
+  const TableUnits units(costs);
   unit_ = units.unit;
   values_.assign((plane_size_ * n) << bits_, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    Fill(problem, static_cast<int>(i), units.free_units, units.contact_units, units.start_units);
+    if (costs.lengths.empty()) {
+      Fill(problem, static_cast<int>(i), units.free_units, units.contact_units, units.start_units);
+    } else {
+      FillGuarded(problem, static_cast<int>(i), units);
+    }
   }
+}
+
+void LocalCertificateTable::FillGuarded(const Problem& problem, int hypothesis, const TableUnits& units) {
+  GuardedWalks walks;
+  walks.size = size_;
+  walks.lengths = problem.move_lengths;
+  walks.step_cost = units.free_units;
+  walks.contact_cost = units.contact_units;
+  walks.action_cost = units.start_units;
+  const auto& mine = problem.hypotheses[static_cast<std::size_t>(hypothesis)];
+  const auto& others = others_[static_cast<std::size_t>(hypothesis)];
+  const auto travel_cells = [&](const Cell& here, Direction d, const Hypothesis& h) {
+    return static_cast<std::uint8_t>(Simulate(problem, here, {d, walks.lengths.back()}, h).cells);
+  };
+  for (const Direction d : kDirections) {
+    const auto k = static_cast<std::size_t>(IndexOf(d));
+    for (int z = workspace_.min.z(); z <= workspace_.max.z(); ++z) {
+      for (int y = workspace_.min.y(); y <= workspace_.max.y(); ++y) {
+        for (int x = workspace_.min.x(); x <= workspace_.max.x(); ++x) {
+          const Cell here(x, y, z);
+          int longest = 0;
+          if (!Blocked(problem, here, mine)) {
+            for (const int length : walks.lengths) {
+              if (workspace_.Contains(here + length * UnitCell(d))) longest = length;
+            }
+          }
+          const auto cell = static_cast<std::uint32_t>(walks.travel[k].size());
+          const std::uint8_t travel = longest > 0 ? travel_cells(here, d, mine) : 0;
+          walks.travel[k].push_back(travel);
+          walks.longest[k].push_back(static_cast<std::uint8_t>(longest));
+          if (longest == 0) continue;
+          GuardedWalks::Telling telling{cell, d, {}};
+          bool tells = false;
+          for (std::size_t i = 0; i < others.size(); ++i) {
+            telling.travel[i] = travel_cells(here, d, problem.hypotheses[static_cast<std::size_t>(others[i])]);
+            tells = tells || telling.travel[i] != travel;
+          }
+          if (tells) walks.telling.push_back(telling);
+        }
+      }
+    }
+  }
+  FillGuardedCertificates(walks, bits_, &values_[(static_cast<std::size_t>(hypothesis) << bits_) * plane_size_]);
 }
 
 void LocalCertificateTable::Fill(const Problem& problem, int hypothesis, std::uint32_t free_units,

@@ -38,6 +38,7 @@ class LocalCertificateTable {
   }
 
  private:
+  void FillGuarded(const Problem& problem, int hypothesis, const TableUnits& units);
   void Fill(const Problem& problem, int hypothesis, std::uint32_t free_units, std::uint32_t contact_units,
             std::uint32_t start_units);
 

@@ -9,14 +9,14 @@
 namespace feeler::planner {
 
 PairCertificates::PairCertificates(std::shared_ptr<const ContactMap> map, const StepCosts& costs, const Cell& spread)
-    : map_(std::move(map)), costs_(costs), spread_(spread) {}
+    : map_(std::move(map)), region_(*map_), costs_(costs), spread_(spread) {}
 
 const PairCertificates::Plane& PairCertificates::Get(const Cell& offset, int orientation) const {
   const std::lock_guard lock(mutex_);
   std::unique_ptr<const Plane>& plane = planes_[{offset.x(), offset.y(), offset.z(), orientation}];
   if (!plane) {
     auto fresh = std::make_unique<Plane>();
-    fresh->grid = CertificateGrid(*map_, costs_, offset.cwiseAbs());
+    fresh->grid = CertificateGrid(region_, costs_, offset.cwiseAbs());
     // Subsets of one other hypothesis: none (all zero), and itself.
     std::vector<std::uint16_t> planes(2 * fresh->grid.cells, 0);
     TableCertificates(*map_, orientation, fresh->grid, {&offset, 1}, planes.data());
@@ -67,8 +67,8 @@ double IsolatedHypotheses::Weighted(SetId set, const Cell& robot) {
   double sum = 0.0;
   for (std::uint32_t i = terms.first; i < terms.first + terms.count; ++i) {
     const Term& term = terms_[i];
-    const std::uint16_t value = term.plane->At(robot - term.offset);
-    if (value == kNoCertificate) return std::numeric_limits<double>::infinity();
+    const std::uint32_t value = term.plane->At(robot - term.offset);
+    if (value >= kNoCertificate) return std::numeric_limits<double>::infinity();
     sum += term.weight * value * term.plane->grid.unit;
   }
   return sum;

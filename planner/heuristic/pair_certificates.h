@@ -23,8 +23,11 @@ class PairCertificates {
   struct Plane {
     CertificateGrid grid;
     std::vector<std::uint16_t> values;
-    /// In units of grid.unit; kNoCertificate if no probe tells the two apart.
-    std::uint16_t At(const Cell& displacement) const { return values[grid.Index(displacement)]; }
+    /// In units of grid.unit; at least kNoCertificate if no probe tells the two apart.
+    std::uint32_t At(const Cell& displacement) const {
+      const std::uint16_t value = values[grid.Index(displacement)];
+      return value == kNoCertificate ? value : value + grid.WayBack(displacement);
+    }
   };
 
   PairCertificates(std::shared_ptr<const ContactMap> map, const StepCosts& costs, const Cell& spread);
@@ -35,6 +38,7 @@ class PairCertificates {
 
  private:
   std::shared_ptr<const ContactMap> map_;
+  ActiveRegion region_;
   StepCosts costs_;
   Cell spread_;
   mutable std::mutex mutex_;

@@ -1,5 +1,7 @@
 #include "planner/solver/planning_tables.h"
 
+#include <numeric>
+
 #include "planner/contact/fill_dead_ends.h"
 #include "planner/heuristic/certificate.h"
 #include "planner/heuristic/cuboid_heuristic.h"
@@ -29,7 +31,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
   options_.cancellation = nullptr;
   options_.on_bounds = nullptr;
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
-  const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths.back());
+  const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths);
   pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
   switch (options.heuristic) {
     case HeuristicKind::kCertificate:
@@ -41,8 +43,11 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
       break;
     case HeuristicKind::kCuboids:
       certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
-      cuboids_ = std::make_shared<CuboidTable>(*problem.map, masks_, *certificate_, costs, SpreadOf(problem),
-                                               ExtentsOf(problem), jobs);
+      // Cuboids are bounded by single steps, in the middle of moves too: so must be what is left of them.
+      cuboids_ = std::make_shared<CuboidTable>(
+          *problem.map, masks_,
+          motions.start > 0.0 ? CertificateTable(*problem.map, costs, SpreadOf(problem)) : *certificate_, costs,
+          SpreadOf(problem), ExtentsOf(problem), jobs);
       break;
     case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
@@ -65,13 +70,16 @@ const PlanningTables::Filled& PlanningTables::filled() const {
     if (!filled_.map) return;
     Problem problem = problem_;
     problem.map = filled_.map;
+    // The open bound looks at walks that begin in the middle of a move, so these may have any length.
+    problem.move_lengths.resize(static_cast<std::size_t>(problem.move_lengths.back()));
+    std::iota(problem.move_lengths.begin(), problem.move_lengths.end(), 1);
     SolverOptions options = options_;
     options.heuristic = HeuristicKind::kCertificate;  // the bound is made of them
     filled_.tables = std::make_shared<const PlanningTables>(problem, options, Parallelism());
     if (!filled_.tables->certificate_) return;
     filled_.bound =
         std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
-                                          MotionCosts(problem_.cost, problem_.move_lengths.back()), SpreadOf(problem_));
+                                          MotionCosts(problem_.cost, problem_.move_lengths), SpreadOf(problem_));
   });
   return filled_;
 }

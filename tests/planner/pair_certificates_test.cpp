@@ -200,7 +200,7 @@ TEST_P(SlantedWalls, BoundsAreAdmissibleAndConsistent) {
     SCOPED_TRACE(problem.name);
     const MapOracle oracle(problem);
     HypothesisSets sets(problem, false);
-    const StepCosts costs = MotionCosts(problem.cost, problem.move_lengths.back());
+    const StepCosts costs = MotionCosts(problem.cost, problem.move_lengths);
     std::array<Cell, 6> neighbours;
     for (const Direction d : kDirections) {
       neighbours[static_cast<std::size_t>(IndexOf(d))] = (SpreadOf(problem)[AxisOf(d)] + 1) * UnitCell(d);
