@@ -7,7 +7,7 @@ namespace feeler::planner {
 
 BeliefGraph::BeliefGraph(const Problem& problem, const ContactMasks& masks, bool canonical)
     : problem_(problem), masks_(masks), sets_(problem, canonical) {
-  table_.assign(1024, kNoBelief);
+  table_.assign(1024, Slot());
 }
 
 BeliefId BeliefGraph::Start() {
@@ -18,27 +18,31 @@ BeliefId BeliefGraph::Start() {
 BeliefId BeliefGraph::Intern(SetId set, const Cell& robot) {
   const std::uint64_t packed = Pack(robot);
   const std::size_t mask = table_.size() - 1;
-  std::size_t at = Hash(set, packed) & mask;
-  for (; table_[at] != kNoBelief; at = (at + 1) & mask) {
-    const Belief& known = beliefs_[table_[at]];
-    if (known.set == set && known.robot == packed) return table_[at];
+  const std::uint64_t hash = Hash(set, packed);
+  const auto tag = static_cast<std::uint32_t>(hash >> 32);
+  std::size_t at = hash & mask;
+  for (; table_[at].belief != kNoBelief; at = (at + 1) & mask) {
+    if (table_[at].tag != tag) continue;  // spares a look at the belief, which is not in the cache
+    const Belief& known = beliefs_[table_[at].belief];
+    if (known.set == set && known.robot == packed) return table_[at].belief;
   }
   const auto b = static_cast<BeliefId>(beliefs_.size());
   Belief belief{packed, set, kUnexpanded, 0, 0.0};
   if (heuristic_ != nullptr) belief.heuristic = heuristic_->Weighted(set, robot);
   beliefs_.push_back(belief);
-  table_[at] = b;
+  table_[at] = {b, tag};
   if (beliefs_.size() * 2 > table_.size()) Grow();
   return b;
 }
 
 void BeliefGraph::Grow() {
-  std::vector<BeliefId> table(table_.size() * 2, kNoBelief);
+  std::vector<Slot> table(table_.size() * 2);
   const std::size_t mask = table.size() - 1;
   for (BeliefId b = 0; b < beliefs_.size(); ++b) {
-    std::size_t at = Hash(beliefs_[b].set, beliefs_[b].robot) & mask;
-    while (table[at] != kNoBelief) at = (at + 1) & mask;
-    table[at] = b;
+    const std::uint64_t hash = Hash(beliefs_[b].set, beliefs_[b].robot);
+    std::size_t at = hash & mask;
+    while (table[at].belief != kNoBelief) at = (at + 1) & mask;
+    table[at] = {b, static_cast<std::uint32_t>(hash >> 32)};
   }
   table_ = std::move(table);
 }
@@ -183,7 +187,7 @@ std::vector<BeliefOutcome> BeliefGraph::Outcomes(BeliefId b, const GuardedMove& 
 
 std::size_t BeliefGraph::bytes() const {
   return beliefs_.capacity() * sizeof(Belief) + actions_.capacity() * sizeof(BeliefAction) +
-         contacts_.capacity() * sizeof(BeliefId) + table_.capacity() * sizeof(BeliefId) + sets_.bytes();
+         contacts_.capacity() * sizeof(BeliefId) + table_.capacity() * sizeof(Slot) + sets_.bytes();
 }
 
 }  // namespace feeler::planner

@@ -89,6 +89,10 @@ class BeliefGraph {
     std::uint32_t action_count = 0;
     double heuristic = 0.0;
   };
+  struct Slot {
+    BeliefId belief = kNoBelief;
+    std::uint32_t tag = 0;  ///< high bits of the hash
+  };
   /// 21 bits a coordinate.
   static std::uint64_t Pack(const Cell& c) {
     const auto bits = [](int x) { return static_cast<std::uint64_t>(x + (1 << 20)); };
@@ -120,7 +124,7 @@ class BeliefGraph {
   std::vector<Belief> beliefs_;
   std::vector<BeliefAction> actions_;
   std::vector<BeliefId> contacts_;
-  std::vector<BeliefId> table_;  ///< open addressing
+  std::vector<Slot> table_;  ///< open addressing
   std::vector<Slab> alive_, hit_, scratch_;
 };
 
