@@ -1,6 +1,7 @@
 #include "evaluation/episode_json.h"
 
 #include <fstream>
+#include <utility>
 
 #include "core/error.h"
 
@@ -57,6 +58,7 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["sim_time_s"] = execution.sim_time_s;
   json["localization_time_s"] = execution.localization_time_s;
   json["peak_force_n"] = record.peak_force_n;
+  json["fell_in"] = execution.fell_in;
   json["ladder"] = nlohmann::ordered_json::array();
   for (const execution::LadderRecord& rung : execution.ladder) {
     json["ladder"].push_back({{"rung", rung.rung}, {"reason", rung.reason}});
@@ -69,6 +71,8 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
 
 EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record) {
   const execution::ExecutionRecord& execution = record.execution;
+  std::vector<std::string> rungs;
+  for (const execution::LadderRecord& rung : execution.ladder) rungs.push_back(rung.rung);
   return {record.task,
           record.policy,
           record.localized,
@@ -79,7 +83,8 @@ EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record) {
           static_cast<double>(execution.policy_moves),
           static_cast<double>(execution.contacts),
           record.peak_force_n,
-          record.timing.plan_cpu_s};
+          record.timing.plan_cpu_s,
+          std::move(rungs)};
 }
 
 std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
@@ -92,12 +97,14 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
     if (line.empty()) continue;
     try {
       const auto json = nlohmann::json::parse(line);
+      std::vector<std::string> rungs;
+      for (const auto& rung : json.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());
       rows.push_back({json.at("task").get<std::string>(), json.at("policy").get<std::string>(),
                       json.at("localized").get<bool>(), json.at("inserted").get<bool>(),
                       json.at("reason").get<std::string>(), json.at("sim_time_s").get<double>(),
                       json.at("path_length_m").get<double>(), json.at("policy_moves").get<double>(),
                       json.at("contacts").get<double>(), json.at("peak_force_n").get<double>(),
-                      json.at("timing").at("plan_cpu_s").get<double>()});
+                      json.at("timing").at("plan_cpu_s").get<double>(), std::move(rungs)});
     } catch (const nlohmann::json::exception& e) {
       throw InputError(path + " line " + std::to_string(number), std::string("not an episode record: ") + e.what(),
                        "remove the line");

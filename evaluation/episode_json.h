@@ -24,6 +24,7 @@ struct EpisodeSummaryRow {
   double contacts = 0.0;
   double peak_force_n = 0.0;
   double plan_cpu_s = 0.0;
+  std::vector<std::string> rungs;  ///< of the fallback ladder, in the order in which they were used
 };
 EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record);
 

@@ -17,6 +17,8 @@ constexpr double kFarthest = 3.5;
 constexpr double kLeastSlack = 1.5;
 /// A contact after a shorter motion may be the wall that the tool has just come off, in cells.
 constexpr double kLeastTold = 0.25;
+/// Touches of one axis, however tight the limit.
+constexpr int kMostContacts = 4;
 /// After a blocked path the tool comes out by this, in cells.
 constexpr double kComeOut = 2.0;
 /// Lines that meet the same wall differ by less than this.
@@ -50,14 +52,24 @@ TargetFit BestFit(const planner::ContactMap& map, const std::vector<Touch>& evid
 /// The axis across the insertion that is most in need of a touch; -1 if none is. An axis that no face has pinned is
 /// felt even where edges and slanted walls leave it narrow: what they tell hangs on the other axes, and one edge met on
 /// the wrong side of a tie would put the whole estimate off by cells.
-int LoosestAxis(const TargetFit& fit, Direction insertion, const std::array<bool, 3>& hopeless) {
+int LoosestAxis(const TargetFit& fit, Direction insertion, const std::array<bool, 3>& hopeless, int contacts_wanted) {
   int loosest = -1;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    if (axis == AxisOf(insertion) || fit.pinned[i] || hopeless[i]) continue;
-    if (loosest < 0 || fit.half_width[axis] > fit.half_width[loosest]) loosest = axis;
+    if (axis == AxisOf(insertion) || fit.contacts[i] >= contacts_wanted || hopeless[i]) continue;
+    if (loosest < 0 || fit.contacts[i] < fit.contacts[static_cast<std::size_t>(loosest)] ||
+        (fit.contacts[i] == fit.contacts[static_cast<std::size_t>(loosest)] &&
+         fit.half_width[axis] > fit.half_width[loosest])) {
+      loosest = axis;
+    }
   }
   return loosest;
+}
+
+/// One contact tells a wall about as well as a shortfall tells a contact; the mean of n of them sqrt(n) times better.
+int ContactsWanted(const ExecutorOptions& options) {
+  const double ratio = options.shortfall_m / options.confirm_limit_m;
+  return std::clamp(static_cast<int>(std::ceil(ratio * ratio - 1e-9)), 1, kMostContacts);
 }
 
 }  // namespace
@@ -113,8 +125,10 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
   const ExecutorOptions& options = mover.options();
   std::array<bool, 3> hopeless{};
   TargetFit fit = BestFit(map, evidence, likely, possible, orientation, options.fit);
-  for (int attempt = 0; attempt < options.confirm_attempts; ++attempt) {
-    const int axis = LoosestAxis(fit, insertion, hopeless);
+  const int contacts_wanted = ContactsWanted(options);
+  const int attempts = options.confirm_attempts + 2 * (contacts_wanted - 1);
+  for (int attempt = 0; attempt < attempts; ++attempt) {
+    const int axis = LoosestAxis(fit, insertion, hopeless, contacts_wanted);
     if (axis < 0) break;
     const auto plan = PlanConfirmingTouch(map, mover.position() - fit.position, axis, orientation);
     if (!plan) {

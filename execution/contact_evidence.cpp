@@ -109,6 +109,7 @@ void SnapToContacts(const planner::ContactMap& map, const std::vector<Touch>& ev
   }
   for (int axis = 0; axis < 3; ++axis) {
     fit.pinned[static_cast<std::size_t>(axis)] = count[axis] > 0.0;
+    fit.contacts[static_cast<std::size_t>(axis)] = static_cast<int>(count[axis]);
     if (count[axis] > 0.0) fit.position[axis] += sum[axis] / count[axis];
   }
 }

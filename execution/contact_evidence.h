@@ -42,8 +42,9 @@ struct FitOptions {
 struct TargetFit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();    ///< lattice coordinates
   Eigen::Vector3d half_width = Eigen::Vector3d::Zero();  ///< of what explains the evidence equally well, per axis
-  std::array<bool, 3> pinned{};  ///< a contact with a wall square to the axis agrees with the fit
-  int violations = 0;            ///< touches that the fit does not explain
+  std::array<bool, 3> pinned{};   ///< a contact with a wall square to the axis agrees with the fit
+  std::array<int, 3> contacts{};  ///< how many such contacts there are
+  int violations = 0;             ///< touches that the fit does not explain
 };
 
 /// Robust fit of a continuous target position in the box [lower, upper] (lattice coordinates): fewest violated touches

@@ -19,8 +19,8 @@ struct ExecutorOptions {
   double fast_margin_cells = 1.0;       ///< the probe begins this far before the nearest predicted contact
   double free_margin_cells = 0.75;      ///< a move is known to be free if no prediction is nearer behind its end
   double retreat_m = 0.0005;  ///< at least so far off a wall after contact, or the next sideways move triggers
-  /// Touches go on until the position across the insertion is known this well: an axis that contacts leave wider than
-  /// this is felt again. Tight limits cost touches.
+  /// Every axis across the insertion is felt until its position is known this well: once, unless the limit is tighter
+  /// than what one contact tells (shortfall_m).
   double confirm_limit_m = 0.0005;
   int confirm_attempts = 4;  ///< touches of axes across the insertion that no face has pinned
   int graze_attempts = 3;    ///< shifts of the lattice by edges met within one episode

@@ -125,7 +125,8 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
       sound ? fmt::format("{}; measured {:.2f} deg", attempt.reason, fit->yaw_rad / kDegree)
             : attempt.reason + "; no wall tells");
   if (!sound) {
-    attempt.end = AttemptEnd::kLost;
+    // Where everything else agrees the place is right, and turns can still be tried.
+    if (!attempt.sure) attempt.end = AttemptEnd::kLost;
     return;
   }
   const double yaw_rad = std::abs(fit->yaw_rad) < kSmallestTurn_rad ? 0.0 : fit->yaw_rad;

@@ -45,8 +45,12 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
   for (const double distance : {gate_distance, kStandoff}) {
     const Eigen::Vector3d place = target + distance * out;
     if ((mover.position() - place).norm() < 0.05) continue;
-    if (mover.Fast(place, "approach").contact) {
-      mover.Retreat(place + out);
+    const Eigen::Vector3d from = mover.position();
+    const MotionReport report = mover.Fast(place, "approach");
+    if (report.contact) {
+      evidence.push_back(ContactAfter(from, report.end));
+      const Eigen::Vector3d back = from - report.end;
+      mover.Retreat(back.norm() > 1.0 ? Eigen::Vector3d(report.end + back.normalized()) : from);
       return {false, false, "insertion: unexpected contact in front of the opening"};
     }
   }

@@ -11,8 +11,8 @@
 namespace feeler::execution {
 
 /// Plans for a belief that no database holds, while the robot waits: with a budget of expansions, not of time, so
-/// that the policy is the same wherever and whenever it is computed. The tables of a contact map are built at its first problem
-/// and shared by all that follow. Thread-safe.
+/// that the policy is the same wherever and whenever it is computed. The tables of a contact map are built at its first
+/// problem and shared by all that follow. Thread-safe.
 class OnlinePlanner {
  public:
   explicit OnlinePlanner(std::int64_t expansion_limit = 3000) : expansion_limit_(expansion_limit) {}

@@ -73,8 +73,9 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
   if (!FollowPath(map, target, *path, "transfer", mover, ignored)) return std::nullopt;
   // Where the tool stood already need not be a lattice point.
   const Eigen::Vector3d place = target + goal.cast<double>() + map.phase();
-  if ((mover.position() - place).norm() > 0.05 && mover.Fast(place, "transfer").contact) {
-    mover.Retreat(place);
+  const Eigen::Vector3d before = mover.position();
+  if ((before - place).norm() > 0.05 && mover.Fast(place, "transfer").contact) {
+    mover.Retreat(before);
     return std::nullopt;
   }
   const int axis = AxisOf(wall.direction);
