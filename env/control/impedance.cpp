@@ -6,6 +6,23 @@
 #include <cmath>
 
 namespace feeler::env {
+namespace {
+
+// The diagonal of J M^-1 J^T: its inverse is the inertia felt along one axis while the others are free. With M = L L^T
+// it is the squared norms of the columns of L^-1 J^T. Written out, because this runs in every control step and Eigen's
+// solver is made for large matrices.
+Vector6 Mobility(const Matrix6& inertia, const Matrix6& jacobian) {
+  const Eigen::LLT<Matrix6> factor(inertia);
+  const Matrix6& lower = factor.matrixLLT();
+  Eigen::Matrix<double, 6, 6, Eigen::RowMajor> half = jacobian.transpose();
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < i; ++k) half.row(i) -= lower(i, k) * half.row(k);
+    half.row(i) /= lower(i, i);
+  }
+  return half.colwise().squaredNorm();
+}
+
+}  // namespace
 
 JointVector CartesianImpedance(const World& world, const ToolFrame& frame, const JointVector& qd_rad_s,
                                const PosePoint& reference, const ImpedanceGains& gains) {
@@ -16,11 +33,7 @@ JointVector CartesianImpedance(const World& world, const ToolFrame& frame, const
   Matrix6 tool_jacobian;  // the same, in tool axes
   tool_jacobian.topRows<3>() = to_tool * jacobian.topRows<3>();
   tool_jacobian.bottomRows<3>() = to_tool * jacobian.bottomRows<3>();
-  // Mobility of the tool axes, J M^-1 J^T; the inverse of its diagonal is the inertia felt along one axis while the
-  // others are free. With M = L L^T the diagonal is the squared norms of the columns of L^-1 J^T.
-  Matrix6 half = tool_jacobian.transpose();
-  world.Inertia().llt().matrixL().solveInPlace(half);
-  const Vector6 mobility = half.colwise().squaredNorm();
+  const Vector6 mobility = Mobility(world.Inertia(), tool_jacobian);
 
   const Vector6 error = PoseError(tool, reference.pose);
   const Vector6 twist_error = reference.twist - jacobian * qd_rad_s;

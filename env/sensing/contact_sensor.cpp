@@ -8,8 +8,6 @@ namespace {
 
 constexpr double kFilter_s = 0.01;
 
-double Gain(double dt_s, double time_constant_s) { return 1.0 - std::exp(-dt_s / time_constant_s); }
-
 std::optional<ContactPair> PairOf(ScenePart a, ScenePart b) {
   if (a > b) std::swap(a, b);  // kRobot < kTool < kTarget < kEnvironment
   if (a == ScenePart::kRobot) {
@@ -43,8 +41,16 @@ std::string_view ToString(ContactPair pair) {
   return "";
 }
 
+double LowPass::Gain(double dt_s) {
+  if (dt_s != dt_s_) {
+    dt_s_ = dt_s;
+    gain_ = 1.0 - std::exp(-dt_s / time_constant_s_);
+  }
+  return gain_;
+}
+
 const Wrench& LowPass::Update(const Wrench& sample, double dt_s) {
-  const double gain = Gain(dt_s, time_constant_s_);
+  const double gain = Gain(dt_s);
   value_.force_n += gain * (sample.force_n - value_.force_n);
   value_.torque_nm += gain * (sample.torque_nm - value_.torque_nm);
   return value_;
@@ -128,7 +134,7 @@ void ContactSensor::Update(const World& world) {
     if (arm1 || arm2) arm += (arm2 ? 1.0 : -1.0) * c.force_n;
   }
   arm_force_ = arm.norm();
-  const double gain = Gain(world.timestep_s(), kFilter_s);
+  const double gain = filter_.Gain(world.timestep_s());
   for (std::size_t i = 0; i < kContactPairCount; ++i) {
     pair_force_[i] = pair[i].norm();
     pair_filtered_[i] += gain * (pair_force_[i] - pair_filtered_[i]);

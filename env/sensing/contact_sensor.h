@@ -33,11 +33,15 @@ class LowPass {
   explicit LowPass(double time_constant_s = 0.01) : time_constant_s_(time_constant_s) {}
   void Reset() { value_ = {}; }
   const Wrench& Update(const Wrench& sample, double dt_s);
+  /// Share of a new sample in the value, for steps of `dt_s`.
+  double Gain(double dt_s);
   const Wrench& value() const { return value_; }
   void Shift(const Wrench& offset);
 
  private:
   double time_constant_s_;
+  double dt_s_ = 0.0;
+  double gain_ = 0.0;  ///< for dt_s_
   Wrench value_;
 };
 
