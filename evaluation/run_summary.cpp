@@ -79,7 +79,7 @@ std::string ToText(const RunSummary& summary) {
   text += fmt::format("peak force       {:.1f} N at most\n", summary.peak_force_max_n);
   text += fmt::format("planning, CPU    {:.2f} ms per episode\n", 1000 * summary.plan_cpu_s);
   text += fmt::format("fallbacks        {}\n", rate(summary.ladder_used));
-  for (const auto& [rung, count] : summary.rungs) text += fmt::format("  {:<15}in {} episodes\n", rung, count);
+  for (const auto& [rung, count] : summary.rungs) text += fmt::format("  {:<16} in {} episodes\n", rung, count);
   for (const auto& [reason, count] : summary.failures) text += fmt::format("failed           {} x {}\n", count, reason);
   return text;
 }

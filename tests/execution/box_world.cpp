@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kClearance = 0.0005;  // of the opening, each side
 constexpr double kChamfer = 0.001;
+constexpr double kLargestYaw = 0.042;
 constexpr double kMotionOverhead = 0.08;  // seconds to start and stop
 
 /// Distance to the entry of one box shrunk across the motion by `slip`, infinity without.
@@ -129,9 +130,17 @@ Eigen::Vector3d KinematicRobot::Displacement(const Eigen::Vector3d& world_m) con
   return world_T_target_.linear().transpose() * (world_m - world_T_target_.translation());
 }
 
+double KinematicRobot::Aside(const Eigen::Vector3d& at) const {
+  return std::max(std::abs(at.x() - faults_.opening_offset_x_m), std::abs(at.y()));
+}
+
+bool KinematicRobot::FitsByYaw() const {
+  const Eigen::Matrix3d turn = world_T_target_.linear().transpose() * world_T_tool_.linear();
+  return std::abs(std::atan2(turn(1, 0), turn(0, 0)) - faults_.opening_yaw_rad) < kLargestYaw;
+}
+
 bool KinematicRobot::InOpening(const Eigen::Vector3d& at) const {
-  return at.z() < 0.0 && at.z() > -task_.insertion_depth_m - 0.001 &&
-         std::max(std::abs(at.x()), std::abs(at.y())) < kClearance + kChamfer;
+  return at.z() < 0.0 && at.z() > -task_.insertion_depth_m - 0.001 && Aside(at) < kClearance + kChamfer;
 }
 
 Pose KinematicRobot::ToolPose() const { return world_T_tool_; }
@@ -159,11 +168,12 @@ MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_
       int axis = 0;
       local.cwiseAbs().maxCoeff(&axis);
       if (local.z() < -0.9) free = std::max(0.0, at.z() + task_.insertion_depth_m);
-      if (axis < 2) free = std::max(0.0, kClearance - (local[axis] > 0 ? at[axis] : -at[axis]));
+      const double off = axis == 0 ? at.x() - faults_.opening_offset_x_m : at[axis];
+      if (axis < 2) free = std::max(0.0, kClearance - (local[axis] > 0 ? off : -off));
     }
     const Eigen::Vector3d wall = at + std::min(free, length) * local;
-    const double lateral = std::max(std::abs(wall.x()), std::abs(wall.y()));
-    if (local.z() < -0.99 && std::abs(wall.z()) < 1e-6) {  // over the opening
+    const double lateral = Aside(wall);
+    if (FitsByYaw() && local.z() < -0.99 && std::abs(wall.z()) < 1e-6) {  // over the opening
       if (lateral < kClearance) {
         free += task_.insertion_depth_m;
       } else if (lateral < kClearance + kChamfer) {
@@ -196,34 +206,53 @@ MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_
 MotionResult KinematicRobot::Transfer(const Pose& world_T_tool) { return Go(world_T_tool.translation(), 0.5, false); }
 
 MotionResult KinematicRobot::LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) {
+  world_T_tool_.linear() = world_T_tool.linear();
   return Go(world_T_tool.translation(), speed_m_s, contact_force_n < 1000.0);
 }
 
 MotionResult KinematicRobot::GuardedMove(const GuardedMotion& motion) {
+  if (faults_.phantom_contacts > 0) {
+    --faults_.phantom_contacts;
+    const Eigen::Vector3d half = 0.5 * motion.distance_m * motion.direction;
+    MotionResult result = Go(world_T_tool_.translation() + half, motion.speed_m_s, true);
+    result.contact = true;
+    result.reason = StopReason::kContact;
+    return result;
+  }
   return Go(world_T_tool_.translation() + motion.distance_m * motion.direction, motion.speed_m_s, true);
 }
 
 MotionResult KinematicRobot::Compliant(const CompliantMotion& motion) {
+  constexpr double kStep_m = 0.0001;
   MotionResult result;
   const Eigen::Vector3d from = world_T_tool_.translation();
-  const Eigen::Vector3d to = motion.world_T_tool.back().translation();
-  const Eigen::Vector3d at = Displacement(from);
-  Eigen::Vector3d end = Displacement(to);
-  const double lateral = std::max(std::abs(at.x()), std::abs(at.y()));
-  // From above the mouth the chamfer leads a tool in that is at most a chamfer and half the clearance off.
-  if (at.z() >= 0.0 && lateral <= kChamfer + 0.5 * kClearance) {
-    const double bottom = -task_.insertion_depth_m;
-    if (end.z() < bottom) end.z() = bottom;
-    inserted_ = end.z() < bottom + 0.001;
-    end.x() = std::clamp(end.x(), -kClearance, kClearance);
-    end.y() = std::clamp(end.y(), -kClearance, kClearance);
-  } else if (end.z() < 0.0 && at.z() >= 0.0) {
-    end.z() = 0.0;
-    result.reason = StopReason::kForceLimit;
-    result.contact = true;
+  for (const Pose& way_point : motion.world_T_tool) {
+    world_T_tool_.linear() = way_point.linear();
+    const Eigen::Vector3d begin = Displacement(world_T_tool_.translation());
+    const Eigen::Vector3d goal = Displacement(way_point.translation());
+    Eigen::Vector3d at = begin;
+    const int steps = std::max(1, static_cast<int>((goal - begin).norm() / kStep_m));
+    for (int i = 1; i <= steps; ++i) {
+      // Follows the command as far as housing and opening let it: along a wall, down a chamfer.
+      const bool inside = InOpening(at);
+      at = begin + (goal - begin) * i / steps;
+      const bool over = FitsByYaw() && Aside(at) <= kChamfer + 0.5 * kClearance;
+      if (at.z() < 0.0 && (inside || over)) {
+        at.x() = std::clamp(at.x(), faults_.opening_offset_x_m - kClearance, faults_.opening_offset_x_m + kClearance);
+        at.y() = std::clamp(at.y(), -kClearance, kClearance);
+        at.z() = std::max(at.z(), -task_.insertion_depth_m);
+      } else if (at.z() < 0.0 && std::abs(at.x()) < 0.041 && std::abs(at.y()) < 0.033) {
+        at.z() = 0.0;
+      }
+    }
+    inserted_ = InOpening(at) && at.z() < -task_.insertion_depth_m + 0.001;
+    if (motion.world_T_tool.size() == 1 && (at - goal).norm() > 0.005) {
+      result.reason = StopReason::kForceLimit;
+      result.contact = true;
+    }
+    world_T_tool_.translation() = world_T_target_ * at;
+    time_s_ += kMotionOverhead + (goal - begin).norm() / motion.speed_m_s;
   }
-  time_s_ += kMotionOverhead + (to - from).norm() / motion.speed_m_s;
-  world_T_tool_.translation() = world_T_target_ * end;
   result.travelled_m = (world_T_tool_.translation() - from).norm();
   result.world_T_tool = world_T_tool_;
   return result;

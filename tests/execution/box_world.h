@@ -42,6 +42,10 @@ struct RobotFaults {
   double measurement_m = 0.00001;
   double stop_s = 0.001;    ///< a contact at speed v is read up to v * stop_s late
   double slip_m = 0.00005;  ///< edges met by less are slid over, up to this, uniform per motion
+  /// Of the opening against the housing, in target axes: the model knows nothing of it.
+  double opening_offset_x_m = 0.0;
+  double opening_yaw_rad = 0.0;
+  int phantom_contacts = 0;  ///< so many guarded motions stop half way with a contact that is none
 };
 
 /// Moves a point through a world of boxes, with faults. The opening is real: within `clearance_m` of its axis the tool
@@ -67,6 +71,10 @@ class KinematicRobot : public Robot {
   MotionResult Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
   Eigen::Vector3d Displacement(const Eigen::Vector3d& world_m) const;
   bool InOpening(const Eigen::Vector3d& displacement_m) const;
+  /// Distance from the axis of the opening, the greater of both axes.
+  double Aside(const Eigen::Vector3d& displacement_m) const;
+  /// The tool is turned by no more than the opening allows (2.4 degrees).
+  bool FitsByYaw() const;
   double Noise(double sigma) { return sigma * random_.Normal(); }
 
   std::vector<Box> boxes_;
