@@ -15,11 +15,12 @@ PoseError ErrorOf(const Task& task, const Pose& world_T_true, const Pose& world_
   const int along = AxisOf(task.insertion);
   Eigen::Vector3d across = difference.translation();
   across[along] = 0.0;
-  return {across.norm(), std::abs(difference.translation()[along]), Eigen::AngleAxisd(difference.linear()).angle()};
+  return {across.norm(), across.cwiseAbs().maxCoeff(), std::abs(difference.translation()[along]),
+          Eigen::AngleAxisd(difference.linear()).angle()};
 }
 
 bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
-  return error.lateral_m <= tolerance.lateral_m && error.vertical_m <= tolerance.vertical_m &&
+  return error.largest_lateral_m <= tolerance.lateral_m && error.vertical_m <= tolerance.vertical_m &&
          error.angle_rad <= tolerance.angle_rad;
 }
 

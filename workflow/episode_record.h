@@ -12,8 +12,9 @@ namespace feeler::workflow {
 
 /// Final estimate against the truth.
 struct PoseError {
-  double lateral_m = 0.0;   ///< across the insertion axis
-  double vertical_m = 0.0;  ///< along it
+  double lateral_m = 0.0;          ///< across the insertion axis
+  double largest_lateral_m = 0.0;  ///< along the worse of the two axes across it: what the tolerance is about
+  double vertical_m = 0.0;         ///< along the insertion axis
   double angle_rad = 0.0;
 };
 

@@ -60,6 +60,7 @@ json ToJson(const EpisodeSetting& setting) {
   return {{"name", setting.name},
           {"task", setting.task},
           {"policy", setting.policy},
+          {"cost", setting.cost},
           {"extents", setting.extents},
           {"noise", setting.noise},
           {"ladder", setting.ladder},
@@ -126,19 +127,20 @@ json EpisodeSweep::SettingsJson() const {
 
 bool EpisodeSweep::Run() {
   std::int64_t total = 0;
-  std::vector<std::string> tasks;
+  std::vector<std::pair<std::string, std::string>> groups;  // task and cost: one database each
   for (const EpisodeSetting& setting : settings_) {
     total += setting.episodes;
     workflow::ParseNoise(setting.noise);
-    if (std::find(tasks.begin(), tasks.end(), setting.task) == tasks.end()) tasks.push_back(setting.task);
+    const std::pair group{setting.task, setting.cost};
+    if (std::find(groups.begin(), groups.end(), group) == groups.end()) groups.push_back(group);
   }
   std::filesystem::create_directories(request_.out + "/" + experiment_);
   std::filesystem::create_directories(request_.out + "/databases");
   // Refuses a folder that was begun under other settings.
   const CellStore store(PartialFile(request_, experiment_), SettingsJson());
   std::int64_t done = 0;
-  for (const std::string& task : tasks) {
-    if (!RunTask(task, done, total)) return false;
+  for (const auto& [task, cost] : groups) {
+    if (!RunGroup(task, cost, done, total)) return false;
   }
   return true;
 }
@@ -149,8 +151,9 @@ struct EpisodeSweep::TaskWorld {
   std::shared_ptr<policies::Database> database;
 };
 
-bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int64_t total) {
+bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, std::int64_t& done, std::int64_t total) {
   workflow::PlanningSetupOptions setup_options;
+  setup_options.cost_kind = cost == ToString(CostKind::kTime) ? CostKind::kTime : CostKind::kDistance;
   setup_options.jobs = request_.jobs;
   setup_options.progress = request_.map_progress;
   TaskWorld world;
@@ -159,7 +162,7 @@ bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int
   planner::ProblemFamily needed;
   std::set<std::string> seen;
   for (const EpisodeSetting& setting : settings_) {
-    if (setting.task != task || !seen.insert(setting.extents).second) continue;
+    if (setting.task != task || setting.cost != cost || !seen.insert(setting.extents).second) continue;
     needed.problems.push_back(planner::ParseExtents(setting.extents));
     needed.spec += (needed.spec.empty() ? "" : ",") + setting.extents;
   }
@@ -169,13 +172,13 @@ bool EpisodeSweep::RunTask(const std::string& task, std::int64_t& done, std::int
   build.solver.gap = kGap;
   build.jobs = request_.jobs;
   build.cancellation = request_.cancellation;
-  const std::string database_file = request_.out + "/databases/" + world.setup->task().name + ".db";
+  const std::string database_file = request_.out + "/databases/" + world.setup->task().name + "-" + cost + ".db";
   if (workflow::BuildDatabase(*world.setup, needed, build, database_file).summary.cancelled) return false;
   world.database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(database_file));
   world.scene = workflow::BuildEpisodeScene(*world.setup);
 
   for (const EpisodeSetting& setting : settings_) {
-    if (setting.task != task) continue;
+    if (setting.task != task || setting.cost != cost) continue;
     if (!RunSetting(world, setting, done, total)) return false;
     done += setting.episodes;
   }

@@ -16,7 +16,8 @@ struct EpisodeSetting {
   std::string name;  ///< distinct within an experiment; letters, digits, hyphens and blanks
   std::string task = "plug";
   std::string policy = "database";
-  std::string extents;  ///< the problem that every episode has, e.g. "7x7x7"
+  std::string cost = "distance";  ///< or "time": what the policies of the database were made to save
+  std::string extents;            ///< the problem that every episode has, e.g. "7x7x7"
   std::string noise = "ideal";
   bool ladder = true;
   /// Name of an earlier setting that differs in `ladder = true` alone: an episode in which it used no fallback is the
@@ -68,7 +69,7 @@ class EpisodeSweep {
  private:
   std::string RecordsFile(const EpisodeSetting& setting) const;
   struct TaskWorld;
-  bool RunTask(const std::string& task, std::int64_t& done, std::int64_t total);
+  bool RunGroup(const std::string& task, const std::string& cost, std::int64_t& done, std::int64_t total);
   bool RunSetting(const TaskWorld& world, const EpisodeSetting& setting, std::int64_t done, std::int64_t total);
 
   std::string experiment_;

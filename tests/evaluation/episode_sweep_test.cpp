@@ -61,7 +61,7 @@ TEST(AcceptanceTest, RowsHaveTheSizesAskedFor) {
     EXPECT_GE(episodes, row.settings.size() > 1 ? 1000 : 300) << row.name;
     plug += row.settings.size() == 4 ? 1 : 0;
   }
-  EXPECT_EQ(plug, 4) << "ideal and friction, bare and with ladder";
+  EXPECT_EQ(plug, 6) << "ideal (two costs) and friction, bare and with ladder";
 }
 
 class EpisodeSweepTest : public ::testing::Test {
