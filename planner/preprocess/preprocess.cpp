@@ -55,7 +55,8 @@ class Framework {
     summary_.problems = static_cast<std::int64_t>(order_.size());
     if (!order_.empty()) {
       tables_ = options_.tables;
-      if (!tables_) tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)), solver_, options_.jobs);
+      if (!tables_)
+        tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)), solver_, options_.jobs);
       MarkStored();
       std::vector<std::jthread> threads;
       for (int i = 1; i < options_.jobs.threads(); ++i) threads.emplace_back([this] { Work(); });
