@@ -106,7 +106,7 @@ void Run(const Flags& flags, Session& session) {
   options.seed = ParseSeed(flags.seed);
   options.family = FamilyFor(flags, setup->task(), database.get());
   options.noise = flags.noise;
-  options.ladder = !flags.no_ladder;
+  options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
   options.confirm_limit_m = flags.confirm_limit_m;
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
@@ -141,7 +141,7 @@ void Run(const Flags& flags, Session& session) {
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["noise"] = flags.noise;
-    json["ladder"] = !flags.no_ladder;
+    json["ladder"] = options.ladder;
     json["seed"] = flags.seed;
     PrintJson(json);
   } else {

@@ -12,6 +12,7 @@ namespace {
 struct Entry {
   const char* name;
   bool needs_database;
+  bool uses_ladder;
   std::unique_ptr<policies::Policy> (*make)(policies::Database* database, const planner::Problem& problem,
                                             const planner::Extents& extents);
 };
@@ -32,9 +33,18 @@ std::unique_ptr<policies::Policy> MakeOpenLoop(policies::Database* /*database*/,
 }
 
 constexpr std::array<Entry, 2> kPolicies = {{
-    {"database", true, MakeDatabase},
-    {"open-loop", false, MakeOpenLoop},
+    {"database", true, true, MakeDatabase},
+    {"open-loop", false, false, MakeOpenLoop},
 }};
+
+const Entry& Find(const std::string& name) {
+  for (const Entry& entry : kPolicies) {
+    if (name == entry.name) return entry;
+  }
+  std::string known;
+  for (const std::string& other : PolicyNames()) known += (known.empty() ? "" : ", ") + other;
+  throw InputError("--policy", "unknown policy \"" + name + "\"", "choose one of " + known);
+}
 
 }  // namespace
 
@@ -44,19 +54,16 @@ std::vector<std::string> PolicyNames() {
   return names;
 }
 
+bool UsesLadder(const std::string& name) { return Find(name).uses_ladder; }
+
 PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database) {
-  for (const Entry& entry : kPolicies) {
-    if (name != entry.name) continue;
-    if (entry.needs_database && !database) {
-      throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
-    }
-    return [make = entry.make, database](const planner::Problem& problem, const planner::Extents& extents) {
-      return make(database.get(), problem, extents);
-    };
+  const Entry& entry = Find(name);
+  if (entry.needs_database && !database) {
+    throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
   }
-  std::string known;
-  for (const std::string& other : PolicyNames()) known += (known.empty() ? "" : ", ") + other;
-  throw InputError("--policy", "unknown policy \"" + name + "\"", "choose one of " + known);
+  return [make = entry.make, database](const planner::Problem& problem, const planner::Extents& extents) {
+    return make(database.get(), problem, extents);
+  };
 }
 
 }  // namespace feeler::workflow

@@ -20,6 +20,10 @@ using PolicyFactory =
 /// Names that `MakePolicyFactory` knows.
 std::vector<std::string> PolicyNames();
 
+/// Whether episodes of this policy end with the fallback ladder unless told otherwise: it belongs to policies that
+/// localize by touch, a baseline that does not is measured as it is. Throws InputError for an unknown name.
+bool UsesLadder(const std::string& name);
+
 /// The factory of a policy by its name. `database` serves the policies that read one and may be null for the others.
 /// Throws InputError for an unknown name (listing the known) or a missing database.
 PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database);

@@ -218,7 +218,7 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
   options.seed = request_.seed;
   options.family = {{planner::ParseExtents(setting.extents)}, setting.extents};
   options.noise = setting.noise;
-  options.ladder = setting.ladder;
+  options.ladder = setting.ladder && workflow::UsesLadder(setting.policy);
   options.confirm_limit_m = setting.confirm_limit_m;
   const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, world.database);
   take_over();

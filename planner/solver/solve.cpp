@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "planner/belief/belief_graph.h"
+#include "planner/heuristic/leaving_bound.h"
 #include "planner/solver/bounded_search.h"
 #include "planner/solver/experience.h"
 #include "planner/solver/fewest_moves.h"
@@ -43,6 +44,10 @@ class Attempt {
         watch_(options),
         graph_(problem, tables.masks(), canonical) {
     heuristic_ = tables.MakeHeuristic(problem, graph_.sets());
+    if (options.solver == SolverKind::kCertified && options.heuristic == HeuristicKind::kCertificate &&
+        LeavingBound::Fits(problem)) {
+      heuristic_ = std::make_unique<WithLeavingBound>(problem, graph_.sets(), std::move(heuristic_));
+    }
     graph_.SetHeuristic(heuristic_.get());
     result_.expected_cost = kInfinity;
   }
