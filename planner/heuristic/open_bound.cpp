@@ -13,6 +13,12 @@
 namespace feeler::planner {
 namespace {
 
+/// Steps that looking into so many openings takes at least, where a place serves `each` of them.
+double Rounded(int looks, int each) {
+  const int steps = looks / each;
+  return steps;
+}
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kFirstRadius = 48;
 /// Of rows of up to this many further members all are mates, of longer ones those within reach: certificates get weaker
@@ -289,7 +295,8 @@ double OpenBound::LayerBound(const Bits256& bits, int orientation, const Cell& r
       member.off_path = outside;
       member.off_rest = kInfinity;
     }
-    for (const auto& [mask, split] : splits) {
+    for (const auto& entry : splits) {
+      const auto& split = entry.second;
       if (!split.splits) continue;
       for (const std::size_t leave : {0, 1}) {
         if (split.off_path[leave] == kInfinity) continue;
@@ -305,7 +312,7 @@ double OpenBound::LayerBound(const Bits256& bits, int orientation, const Cell& r
     // If the first split is further than the radius.
     double beyond = kInfinity;
     for (int m = 0; m < count; ++m) {
-      const double delay = m == 0 ? 0.0 : layer.first + (m - 1) / layer.each;
+      const double delay = m == 0 ? 0.0 : layer.first + Rounded(m - 1, layer.each);
       beyond =
           std::min(beyond, layer.slots_before[static_cast<std::size_t>(m)] + (count - m) * std::max(outside, delay));
     }
@@ -445,9 +452,9 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
   if (!refine) {
     double bound = kInfinity;
     for (std::size_t m = static_cast<std::size_t>(inside); m < count; ++m) {
-      const double delayed = m == 0 ? 0.0 : layer.first + static_cast<int>(m - 1) / layer.each + to_mouths;
+      const double delayed = m == 0 ? 0.0 : layer.first + Rounded(static_cast<int>(m - 1), layer.each) + to_mouths;
       const double time = std::max(way, delayed);
-      const double again = std::max(time + to_mouths, layer.first + static_cast<int>(m) / layer.each);
+      const double again = std::max(time + to_mouths, layer.first + Rounded(static_cast<int>(m), layer.each));
       const int rest = static_cast<int>(count - m);
       const double early = layer.slots_before[m];
       const double a = sum_from_start - static_cast<double>(m) * best_from_start -
@@ -549,16 +556,16 @@ void OpenBound::Evaluate(const Layer& layer, Candidate& candidate, bool refine) 
     const double early = layer.slots_before[m];
     const double early_on_path = static_cast<double>(m) * layer.first + 0.5 * static_cast<double>(m * (m - (m > 0)));
     if (early_on_path > bound) break;
-    const double delayed = m == 0 ? 0.0 : layer.first + static_cast<int>(m - 1) / layer.each + to_mouths;
+    const double delayed = m == 0 ? 0.0 : layer.first + Rounded(static_cast<int>(m - 1), layer.each) + to_mouths;
     const double time = std::max(way, delayed);
-    const double again = std::max(time + to_mouths, layer.first + static_cast<int>(m) / layer.each);
+    const double again = std::max(time + to_mouths, layer.first + Rounded(static_cast<int>(m), layer.each));
     const double scale = most_from_here > 0.0 ? std::clamp((layer.outside - time) / most_from_here, 0.0, 1.0) : 1.0;
     const double mate_scale =
         most_mate_here > 0.0 ? std::clamp((layer.outside - time) / most_mate_here, 0.0, 1.0) : 1.0;
     // By the number of openings that are looked into in all.
     double late = 0.0;
     for (std::size_t looks = m; looks < count; ++looks) {
-      if (looks > m) late += again + static_cast<int>(looks - 1 - m) / layer.each;
+      if (looks > m) late += again + Rounded(static_cast<int>(looks - 1 - m), layer.each);
       const double least_rest = static_cast<double>(count - looks) * time;
       double best = early + least_rest;
       for (const Variant& variant : variants) {

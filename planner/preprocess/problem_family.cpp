@@ -159,8 +159,7 @@ ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string sp
     all.problems.insert(all.problems.end(), family.problems.begin(), family.problems.end());
   }
   std::ranges::sort(all.problems);
-  const auto repeated = std::ranges::unique(all.problems);
-  all.problems.erase(repeated.begin(), repeated.end());
+  all.problems.erase(std::unique(all.problems.begin(), all.problems.end()), all.problems.end());
   return all;
 }
 
