@@ -1,6 +1,7 @@
 #include "planner/heuristic/leaving_bound.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cstdlib>
 #include <limits>
 #include <utility>
@@ -52,12 +53,16 @@ std::size_t Faces(const ContactMap& map, std::size_t most) {
 }  // namespace
 
 LeavingBound::LeavingBound(const Problem& problem) : problem_(problem), domain_(problem.map->domain()) {
+  assert(Fits(problem));
   const Cell size = domain_.Size();
   strides_ = {1, size.x(), std::int64_t{size.x()} * size.y()};
   radius_ = problem.workspace.Size().z() == 1 ? kRadius2d : kRadius3d;
   if (problem.goal == GoalKind::kInsertable) {
     most_in_goal_ = static_cast<std::size_t>((problem.insertable_spread + Cell::Ones()).cast<std::int64_t>().prod());
   }
+  most_in_goal_ = std::min(most_in_goal_, kMostHypotheses);
+  for (std::size_t k = 0; k <= most_in_goal_; ++k) zeros_.emplace_back(k + 1, 0.0);
+  seen_.assign(static_cast<std::size_t>(problem.workspace.Count()), 0);
   for (int orientation = 0; orientation < problem.map->orientations(); ++orientation) FillFlags(orientation);
 }
 
@@ -156,7 +161,10 @@ const LeavingBound::Probes& LeavingBound::ProbesOfSet(SetId set, const Group& gr
   const auto [entry, added] = probes_.try_emplace(set);
   Probes& probes = entry->second;
   if (!added) return probes;
-  std::vector<std::pair<std::int64_t, Cell>> places;
+  // Places from which some member is touched, each once.
+  ++sets_seen_;
+  const Cell size = problem_.workspace.Size();
+  std::vector<Cell> places;
   std::vector<const std::uint8_t*> tables;
   for (const Member& member : group) {
     const Cell offset = ToCell(member.offset);
@@ -164,17 +172,17 @@ const LeavingBound::Probes& LeavingBound::ProbesOfSet(SetId set, const Group& gr
     tables.push_back(flags_[orientation].data() + Linear(-offset - domain_.min));
     for (const Cell& face : faces_[orientation]) {
       const Cell place = face + offset;
-      if (problem_.workspace.Contains(place)) places.emplace_back(Linear(place), place);
+      if (!problem_.workspace.Contains(place)) continue;
+      const Cell o = place - problem_.workspace.min;
+      std::uint32_t& seen =
+          seen_[static_cast<std::size_t>((std::int64_t{o.z()} * size.y() + o.y()) * size.x() + o.x())];
+      if (std::exchange(seen, sets_seen_) != sets_seen_) places.push_back(place);
     }
   }
-  std::ranges::sort(places, {}, &std::pair<std::int64_t, Cell>::first);
-  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
-  places.erase(std::unique(places.begin(), places.end(), same), places.end());
-  std::map<const std::vector<double>*, std::uint32_t> index;
+  std::unordered_map<const std::vector<double>*, std::uint32_t> index;
   std::vector<double> own;
-  for (const auto& item : places) {
-    const std::int64_t at = item.first;
-    const Cell& place = item.second;
+  for (const Cell& place : places) {
+    const std::int64_t at = Linear(place);
     const auto step = [&](const std::vector<double>& bounds, Direction d) {
       const Probe probe{{static_cast<std::int16_t>(place.x()), static_cast<std::int16_t>(place.y()),
                          static_cast<std::int16_t>(place.z())},
@@ -205,7 +213,7 @@ unsigned LeavingBound::ForEachTellingStep(const Group& group, const std::vector<
                                           const Cell& place, const CellBox& box, F f) {
   lookups_ += static_cast<std::int64_t>(group.size());
   const std::int64_t at = Linear(place);
-  std::vector<std::uint8_t> flags(group.size());
+  std::array<std::uint8_t, kMostHypotheses> flags;
   unsigned any = 0;
   unsigned every = kBlocked - 1;
   for (std::size_t i = 0; i < group.size(); ++i) {
@@ -219,9 +227,17 @@ unsigned LeavingBound::ForEachTellingStep(const Group& group, const std::vector<
     if ((every & bit) != 0 || !box.Contains(place + UnitCell(d))) continue;  // nobody gets further, and nobody learns
     further |= bit;
     if ((any & bit) == 0) continue;
+    const auto is_singled_out = [&](std::uint8_t flag) { return (flag & bit) != 0; };
+    const auto count = static_cast<std::size_t>(
+        std::count_if(flags.begin(), flags.begin() + static_cast<std::ptrdiff_t>(group.size()), is_singled_out));
+    if (count <= most_in_goal_) {
+      f(zeros_[count], d);
+      continue;
+    }
     Group singled_out;
+    singled_out.reserve(count);
     for (std::size_t i = 0; i < group.size(); ++i) {
-      if ((flags[i] & bit) == 0) continue;
+      if (!is_singled_out(flags[i])) continue;
       singled_out.push_back(group[i]);
       for (std::size_t axis = 0; axis < 3; ++axis) {
         singled_out.back().offset[axis] -= place[static_cast<Eigen::Index>(axis)];
@@ -232,11 +248,22 @@ unsigned LeavingBound::ForEachTellingStep(const Group& group, const std::vector<
   return further;
 }
 
+std::size_t LeavingBound::HashOfGroup::operator()(const Group& group) const {
+  std::uint64_t hash = group.size();
+  for (const Member& member : group) {
+    for (const int part : {member.offset[0], member.offset[1], member.offset[2], member.orientation}) {
+      hash = (hash ^ static_cast<std::uint32_t>(part)) * 0x9E3779B97F4A7C15;
+    }
+    hash ^= hash >> 31;
+  }
+  return hash;
+}
+
 const std::vector<double>& LeavingBound::OfGroup(const Group& group) {
   const auto known = known_.find(group);
   if (known != known_.end()) return known->second;
   std::vector<double> bounds(group.size() + 1, 0.0);
-  if (group.size() > most_in_goal_ && lookups_ < kMostLookups) {
+  if (lookups_ < kMostLookups) {
     CellBox box{Cell::Constant(-radius_), Cell::Constant(radius_)};
     for (const Member& member : group) {  // where all displacements are of the map: the workspace lies within
       box.min = box.min.cwiseMax(domain_.min + ToCell(member.offset));

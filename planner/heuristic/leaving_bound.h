@@ -4,7 +4,6 @@
 #include <array>
 #include <compare>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <unordered_map>
 #include <utility>
@@ -90,9 +89,16 @@ class LeavingBound {
   std::size_t most_in_goal_ = 1;
   int radius_ = 0;
   std::int64_t lookups_ = 0;
-  std::map<Group, std::vector<double>> known_;
+  struct HashOfGroup {
+    std::size_t operator()(const Group& group) const;
+  };
+  /// Looked up only, never walked through.
+  std::unordered_map<Group, std::vector<double>, HashOfGroup> known_;
+  std::vector<std::vector<double>> zeros_;  ///< bounds of groups that a goal may keep, by size
   std::unordered_map<SetId, Probes> probes_;
   std::size_t probe_count_ = 0;
+  std::vector<std::uint32_t> seen_;  ///< places of the workspace: the last set that looked at it, by number
+  std::uint32_t sets_seen_ = 0;
   std::size_t bytes_ = 0;  ///< of groups, about
 };
 
