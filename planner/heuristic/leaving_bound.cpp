@@ -81,7 +81,7 @@ bool LeavingBound::Fits(const Problem& problem) {
 void LeavingBound::FillFlags(int orientation) {
   std::vector<std::uint8_t>& flags = flags_.emplace_back();
   std::vector<Cell>& faces = faces_.emplace_back();
-  CellBox& box = face_boxes_.emplace_back(domain_.max, domain_.min);
+  CellBox& box = face_boxes_.emplace_back(CellBox{domain_.max, domain_.min});
   flags.reserve(static_cast<std::size_t>(domain_.Count()));
   for (int z = domain_.min.z(); z <= domain_.max.z(); ++z) {
     for (int y = domain_.min.y(); y <= domain_.max.y(); ++y) {
