@@ -18,13 +18,18 @@
 namespace feeler::workflow {
 namespace {
 
+/// What each problem is solved with.
+planner::SolverOptions Budgeted(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
+  return planner::WithFamilyBudget(options.solver, setup.opening == env::Opening::kOpen);
+}
+
 /// Null where there is no limit: JSON has no infinity.
 nlohmann::json Limit(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 }  // namespace
 
 policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
-  const planner::SolverOptions solver = planner::WithFamilyBudget(options.solver);  // what is used
+  const planner::SolverOptions solver = Budgeted(setup, options);
   nlohmann::json settings = {
       {"solver", planner::ToString(solver.solver)},
       {"heuristic", planner::ToString(solver.heuristic)},
@@ -70,9 +75,11 @@ void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
                             const planner::PreprocessOptions& options, const std::string& path) {
   policies::Database database = policies::Database::OpenOrCreate(path, IdentityOf(setup, options));
-  policies::DatabaseSink sink(database, options.solver);
+  planner::PreprocessOptions budgeted = options;
+  budgeted.solver = Budgeted(setup, options);
+  policies::DatabaseSink sink(database, budgeted.solver);
   DatabaseBuild build;
-  build.summary = planner::Preprocess(setup.task(), setup.map, family, options, sink);
+  build.summary = planner::Preprocess(setup.task(), setup.map, family, budgeted, sink);
   build.info = database.Info();
   return build;
 }

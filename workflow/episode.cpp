@@ -78,11 +78,19 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
 
   record.policy = policy->name();
 
+  env::SimulatedRobot& robot = environment_->robot();
+  ReplayRecorder recorder(robot.world().scene());
+  if (options_.replay) {
+    robot.SetObserver([&](const env::World& world) { recorder.See(world); }, 0.0);
+    recorder.See(robot.world());
+  }
+
   const double transfer_start_s = ThreadCpuSeconds();
   const MotionResult transfer =
       environment_->robot().Transfer(execution::StartPose(task, problem, draw.world_T_estimate));
   record.timing.transfer_cpu_s = ThreadCpuSeconds() - transfer_start_s;
 
+  recorder.MarkStart(robot.Time());
   if (transfer.reason == StopReason::kReached) {
     execution::ExecutorOptions options;
     if (reset.noise.contact_threshold_n > options.contact_force_n) {
@@ -97,6 +105,11 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   } else {
     record.execution.reason = "transfer to the start pose: " + std::string(ToString(transfer.reason)) +
                               (transfer.detail.empty() ? "" : ", " + transfer.detail);
+  }
+
+  if (options_.replay) {
+    robot.SetObserver({}, 0.0);
+    record.replay = recorder.Take(robot.world());
   }
 
   // The score: from here on the truth may be looked at.

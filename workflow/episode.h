@@ -28,6 +28,8 @@ struct EpisodeOptions {
   bool ladder = true;           ///< fallbacks when the policy does not come to an insertion
   /// How well the position across the insertion must be known before the insertion; default: the executor's.
   std::optional<double> confirm_limit_m;
+  /// Keep what the episode looked like in its record. Not for a robot that somebody else observes.
+  bool replay = false;
   /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
   bool withhold_true_pose = false;
 };

@@ -7,6 +7,7 @@
 #include "core/pose.h"
 #include "execution/execution_record.h"
 #include "planner/preprocess/problem_family.h"
+#include "workflow/replay.h"
 
 namespace feeler::workflow {
 
@@ -34,6 +35,7 @@ struct EpisodeRecord {
   std::string reason;                         ///< "inserted", or why not
   double peak_force_n = 0.0;                  ///< exact contact force on tool and gripper
   execution::ExecutionRecord execution;       ///< what the executor did and believes
+  std::optional<Replay> replay;               ///< if it was asked for
 
   struct Timing {
     double plan_cpu_s = 0.0;      ///< look-up and decisions of the policy

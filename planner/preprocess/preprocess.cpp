@@ -20,6 +20,7 @@ namespace {
 constexpr std::size_t kLookAhead = 256;
 /// Budget of the certified solver for a problem where none is given.
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
+constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
 
 /// The largest extents along each axis.
 Extents LargestExtents(const ProblemFamily& family) {
@@ -198,10 +199,10 @@ class Framework {
 
 }  // namespace
 
-SolverOptions WithFamilyBudget(SolverOptions solver) {
+SolverOptions WithFamilyBudget(SolverOptions solver, bool openings) {
   if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
       solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
-    solver.expansion_limit = kDefaultExpansionLimit;
+    solver.expansion_limit = openings ? kDefaultExpansionLimitOpen : kDefaultExpansionLimit;
   }
   if (solver.solver == SolverKind::kCertified && solver.gap < kTightGap && solver.cuboids_where_tight &&
       solver.heuristic == HeuristicKind::kCertificate) {

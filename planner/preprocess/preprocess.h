@@ -25,9 +25,10 @@ class PolicySink {
 };
 
 /// The options that each problem of a family is solved with: the certified solver without any limit is given 20,000
-/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family; at a gap
-/// below kTightGap it takes cuboids for certificates, unless told not to.
-SolverOptions WithFamilyBudget(SolverOptions solver);
+/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family (500 where the map
+/// has openings: the first policy and the bound at the start are all there, and the search between them adds nothing);
+/// at a gap below kTightGap it takes cuboids for certificates, unless told not to.
+SolverOptions WithFamilyBudget(SolverOptions solver, bool openings = false);
 
 struct PreprocessOptions {
   /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them.
