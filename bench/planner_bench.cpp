@@ -46,7 +46,7 @@ BENCHMARK(ContactMapLookUp);
 /// Breadth-first growth of the belief graph from the start: heuristic included, no search on top. The worst case: near
 /// the start beliefs hold thousands of hypotheses, and the heuristic looks at each. Searches soon come to small
 /// beliefs.
-void Expansions(benchmark::State& state) {
+void BreadthFirstExpansions(benchmark::State& state) {
   const Problem problem = MakeCuboidProblem(ThePlug().task, ThePlug().map, Cube(state));
   std::int64_t expansions = 0;
   for (auto _ : state) {
@@ -61,7 +61,7 @@ void Expansions(benchmark::State& state) {
   }
   state.counters["expansions/s"] = benchmark::Counter(static_cast<double>(expansions), benchmark::Counter::kIsRate);
 }
-BENCHMARK(Expansions)->Arg(3)->Arg(7)->Arg(15)->Unit(benchmark::kMillisecond);
+BENCHMARK(BreadthFirstExpansions)->Arg(3)->Arg(7)->Arg(15)->Unit(benchmark::kMillisecond);
 
 void SolveRtdpBel(benchmark::State& state) {
   const Problem problem = MakeCuboidProblem(ThePlug().task, ThePlug().map, Cube(state));

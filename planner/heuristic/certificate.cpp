@@ -1,5 +1,6 @@
 #include "planner/heuristic/certificate.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -48,7 +49,9 @@ double CertificateHeuristic::Weighted(SetId set, const Cell& robot) {
 double CertificateHeuristic::Neighbours(SetId set, const Cell& robot) {
   const HypothesisSets::Info& info = sets_.info(set);
   const CellBox& domain = table_->grid().domain;
-  if (!domain.Contains(robot - info.low) || !domain.Contains(robot - info.high)) return Slow(set, robot);
+  if (!domain.Contains(robot - info.low) || !domain.Contains(robot - info.high)) {
+    return uniform_ ? Beyond(set, robot) : BeyondOneByOne(set, robot);
+  }
   const Terms& terms = Prepare(set);
   const std::uint16_t* const values = table_->values();
   const auto base = static_cast<std::int64_t>(table_->grid().Index(robot - info.low)) +
@@ -78,7 +81,72 @@ double CertificateHeuristic::Neighbours(SetId set, const Cell& robot) {
   return sum * table_->grid().unit;
 }
 
-double CertificateHeuristic::Slow(SetId set, const Cell& robot) {
+const CertificateHeuristic::Terms& CertificateHeuristic::PrepareRows(SetId set) {
+  if (set >= row_terms_.size()) row_terms_.resize(sets_.count());
+  Terms& terms = row_terms_[set];
+  if (terms.ready) return terms;
+  terms.ready = true;
+  terms.first = static_cast<std::uint32_t>(rows_.size());
+  NeighbourMasks(sets_, set, table_->neighbours(), masks_);
+  std::size_t k = 0;
+  sets_.ForEach(set, [&](const Cell& h, int orientation, std::uint32_t, int) {
+    const int mask = masks_[k++];
+    if (rows_.size() > terms.first) {
+      Row& last = rows_.back();
+      if (last.mask == mask && last.orientation == orientation && h == last.first + Cell(last.length, 0, 0)) {
+        ++last.length;
+        return;
+      }
+    }
+    rows_.push_back({h, 1, orientation, mask});
+  });
+  terms.count = static_cast<std::uint32_t>(rows_.size()) - terms.first;
+  return terms;
+}
+
+double CertificateHeuristic::Beyond(SetId set, const Cell& robot) {
+  const Terms& terms = PrepareRows(set);
+  const CertificateGrid& grid = table_->grid();
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = terms.first; i < terms.first + terms.count; ++i) {
+    const Row& row = rows_[i];
+    // Displacements from..to along x; those beyond an end of the grid have the value at that end, and a way back.
+    const Cell to = robot - row.first;
+    const int from = to.x() - row.length + 1;
+    const int left = std::clamp(grid.domain.min.x() - from, 0, row.length);
+    const int right = std::clamp(to.x() - grid.domain.max.x(), 0, row.length);
+    const std::uint16_t* const values =
+        table_->values() + static_cast<std::size_t>(row.orientation * CertificateTable::kMasks + row.mask) * grid.cells;
+    const std::size_t at = grid.Index(Cell(from, to.y(), to.z()));
+    const auto inside = static_cast<std::size_t>(row.length - left - right);
+    std::uint32_t worst = 0;
+    std::uint32_t inside_sum = 0;
+    for (std::size_t j = 0; j < inside; ++j) {
+      const std::uint32_t value = values[at + j];
+      worst = worst > value ? worst : value;
+      inside_sum += value;
+    }
+    sum += inside_sum;
+    const auto at_end = [&](std::uint32_t value, int count) {
+      worst = std::max(worst, value);
+      sum += std::uint64_t{value} * static_cast<std::uint64_t>(count);
+    };
+    if (left > 0) at_end(values[at], left);
+    if (right > 0) at_end(values[grid.Index(to)], right);
+    if (worst == CertificateTable::kUnreachable) return std::numeric_limits<double>::infinity();
+    if (row.mask == 0) continue;
+    sum += static_cast<std::uint64_t>(row.length) *
+           grid.WayBack(Cell(std::clamp(to.x(), grid.domain.min.x(), grid.domain.max.x()), to.y(), to.z()));
+    const auto triangle = [](int n) { return static_cast<std::uint64_t>(n) * (static_cast<std::uint64_t>(n) + 1) / 2; };
+    // The nearest of those beyond an end may be more than one cell out, if the whole row is.
+    const auto outside = [&](int furthest, int count) { return triangle(furthest) - triangle(furthest - count); };
+    if (grid.free_below[0] && left > 0) sum += outside(grid.domain.min.x() - from, left) * grid.free_units;
+    if (grid.free_above[0] && right > 0) sum += outside(to.x() - grid.domain.max.x(), right) * grid.free_units;
+  }
+  return static_cast<double>(sum) * grid.unit;
+}
+
+double CertificateHeuristic::BeyondOneByOne(SetId set, const Cell& robot) {
   NeighbourMasks(sets_, set, table_->neighbours(), masks_);
   double sum = 0.0;
   std::size_t k = 0;

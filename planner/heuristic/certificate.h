@@ -19,7 +19,8 @@ class CertificateHeuristic final : public BeliefHeuristic {
   double Weighted(SetId set, const Cell& robot) override;
   std::size_t bytes() const override {
     return terms_.capacity() * sizeof(Terms) + offsets_.capacity() * sizeof(std::int64_t) +
-           runs_.capacity() * sizeof(Run) + weights_.capacity() * sizeof(double) + isolated_.bytes();
+           runs_.capacity() * sizeof(Run) + rows_.capacity() * sizeof(Row) + weights_.capacity() * sizeof(double) +
+           isolated_.bytes();
   }
 
  private:
@@ -29,21 +30,33 @@ class CertificateHeuristic final : public BeliefHeuristic {
     std::int64_t first = 0;
     std::uint32_t length = 0;
   };
-  /// Of a set: its runs for a uniform prior, else its hypotheses one by one.
+  /// The same with coordinates, for places beyond the grid: `length` hypotheses from `first` on along +x.
+  struct Row {
+    Cell first = Cell::Zero();
+    std::int32_t length = 0;
+    std::int32_t orientation = 0;
+    std::int32_t mask = 0;
+  };
+  /// Of a set: its runs (or rows) for a uniform prior, else its hypotheses one by one.
   struct Terms {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
     bool ready = false;
   };
   const Terms& Prepare(SetId set);
+  const Terms& PrepareRows(SetId set);
   double Neighbours(SetId set, const Cell& robot);
-  double Slow(SetId set, const Cell& robot);
+  /// Where some displacement lies beyond the grid.
+  double Beyond(SetId set, const Cell& robot);
+  double BeyondOneByOne(SetId set, const Cell& robot);
 
   const HypothesisSets& sets_;
   std::shared_ptr<const CertificateTable> table_;
   IsolatedHypotheses isolated_;
   std::vector<Terms> terms_;
   std::vector<Run> runs_;
+  std::vector<Terms> row_terms_;
+  std::vector<Row> rows_;
   std::vector<std::int64_t> offsets_;
   std::vector<double> weights_;  ///< beside `offsets_`
   std::vector<std::uint8_t> masks_;
