@@ -1,5 +1,6 @@
 #include "core/task.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -29,6 +30,13 @@ CostWeights TimeCost(const Task& task) {
   return {per_cell_s, task.times.time_per_contact_s, task.times.time_per_move_s};
 }
 
+double InsertionAngle(const Task& task, const Eigen::Matrix3d& rotation) {
+  if (!task.turns_freely) return Eigen::AngleAxisd(rotation).angle();
+  const Eigen::Vector3d axis = UnitVector(task.insertion);
+  const Eigen::Vector3d turned = rotation * axis;
+  return std::atan2(axis.cross(turned).norm(), axis.dot(turned));
+}
+
 Cell CuboidOf(const Task& task, const std::vector<int>& extents) {
   Cell cuboid = Cell::Ones();
   for (std::size_t i = 0; i < task.axes.size() && i < extents.size(); ++i) {
@@ -56,10 +64,12 @@ Cell StartCell(const Task& task, const Cell& cuboid) {
 CellBox WorkspaceCells(const Task& task, const Cell& cuboid) {
   const Cell start = StartCell(task, cuboid);
   Cell half;
+  Cell center;
   for (int axis = 0; axis < 3; ++axis) {
     half[axis] = static_cast<int>(std::floor(task.workspace_m[axis] / task.cell_m + 1e-9));
+    center[axis] = start[axis] + static_cast<int>(std::round(task.workspace_center_m[axis] / task.cell_m));
   }
-  return {start - half, start + half};
+  return {center - half, center + half};
 }
 
 CellBox DisplacementsOf(const Task& task) {

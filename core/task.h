@@ -79,13 +79,20 @@ struct Task {
   MotionTimes times;
   GoalKind goal = GoalKind::kSingleton;
   std::vector<int> move_lengths = {1, 2, 4, 8, 16};
-  Eigen::Vector3d workspace_m{0.2, 0.2, 0.1};  ///< half extents of the workspace of the tool around the start pose
-  Pose world_T_target = Pose::Identity();      ///< nominal pose of the target, as the file places it
-  Pose flange_T_tool = Pose::Identity();       ///< how the robot holds the tool
+  Eigen::Vector3d workspace_m{0.2, 0.2, 0.1};   ///< half extents of the workspace of the tool
+  Eigen::Vector3d workspace_center_m{0, 0, 0};  ///< its centre, from the start pose
+  /// The parts are round about the insertion axis where they mate: a turn about it is no error of an insertion.
+  bool turns_freely = false;
+  Pose world_T_target = Pose::Identity();  ///< nominal pose of the target, as the file places it
+  Pose flange_T_tool = Pose::Identity();   ///< how the robot holds the tool
 };
 
 /// The weights in seconds that the times of the task come to.
 CostWeights TimeCost(const Task& task);
+
+/// The angle of a rotation between tool and target that an insertion feels: all of it, or, where the parts turn freely,
+/// that between their insertion axes. Radians, 0 to pi.
+double InsertionAngle(const Task& task, const Eigen::Matrix3d& rotation);
 
 /// Number of hypotheses along x, y and z at the extents given for the uncertain axes of the task (1 along a certain
 /// axis), in the order of task.axes. Angular axes do not count.
@@ -95,7 +102,7 @@ Cell LargestCuboid(const Task& task);
 /// Lattice cell of the tool at the start pose of a problem with a cuboid of `cuboid` hypotheses:
 /// floor((n - 1)/2 + start_offset/cell) per axis.
 Cell StartCell(const Task& task, const Cell& cuboid);
-/// The cells that the tool may be in for that problem: workspace_m around the start cell.
+/// The cells that the tool may be in for that problem: workspace_m around the start cell, moved by workspace_center_m.
 CellBox WorkspaceCells(const Task& task, const Cell& cuboid);
 /// Every displacement r - h that some problem of the task can meet.
 CellBox DisplacementsOf(const Task& task);

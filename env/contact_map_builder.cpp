@@ -22,14 +22,6 @@ using planner::ContactMap;
 /// Accuracy of travel, in cells.
 constexpr double kAccuracy_cells = 1e-3;
 
-std::vector<int> GeomsOf(const TaskModel& task_model, Opening opening) {
-  std::vector<int> geoms = task_model.target_geoms;
-  if (opening == Opening::kClosed) {
-    geoms.insert(geoms.end(), task_model.lid_geoms.begin(), task_model.lid_geoms.end());
-  }
-  return geoms;
-}
-
 /// The lattice lines of a domain along one axis, numbered; the third axis' coordinate varies fastest.
 struct Lines {
   CellBox domain;
@@ -183,28 +175,6 @@ void CheckStarts(const Task& task, const ContactMap& map, const std::string& whe
 
 }  // namespace
 
-std::string_view ToString(Opening opening) { return opening == Opening::kClosed ? "closed" : "open"; }
-
-std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
-  const auto angles = [&](AxisKind kind) {
-    std::vector<double> values = {0.0};
-    for (const UncertainAxis& axis : task.axes) {
-      if (axis.kind != kind) continue;
-      values.clear();
-      for (int k = 0; k < axis.max_cells; ++k) values.push_back((k - (axis.max_cells - 1) / 2.0) * axis.resolution);
-    }
-    return values;
-  };
-  std::vector<Eigen::Quaterniond> orientations;
-  for (const double yaw : angles(AxisKind::kYaw)) {
-    for (const double pitch : angles(AxisKind::kPitch)) {
-      orientations.emplace_back(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
-                                Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()));
-    }
-  }
-  return orientations;
-}
-
 ContactMap BuildContactMap(const TaskModel& task_model, Opening opening, Parallelism parallelism,
                            const ProgressCallback& callback) {
   const Task& task = task_model.task;
@@ -213,30 +183,31 @@ ContactMap BuildContactMap(const TaskModel& task_model, Opening opening, Paralle
     throw InputError(fmt::format("{}: <custom><numeric name=\"feeler_workspace\">", task.file),
                      fmt::format("needs a contact map of {} cells", domain.Count()), "lower it, or use larger cells");
   }
+  const FeltGeoms geoms = GeomsOf(task_model, opening);
   std::vector<ObstacleSet> sets;
   for (const Eigen::Quaterniond& orientation : TargetOrientations(task)) {
-    sets.emplace_back(task_model, GeomsOf(task_model, opening), orientation);
+    sets.emplace_back(task_model, geoms, orientation);
   }
   std::int64_t lines_in_all = 0;
   for (int axis = 0; axis < 3; ++axis) lines_in_all += Lines{domain, axis}.count();
-  Progress progress(callback, 2 * lines_in_all * static_cast<std::int64_t>(sets.size()));
+  Progress progress(callback, lines_in_all * (1 + static_cast<std::int64_t>(sets.size())));
 
   // First pass, lattice lines beside the axes of the target: where are the walls? Lines exactly on the axes would run
-  // in faces that lie at whole cells, where rounding decides.
+  // in faces that lie at whole cells, where rounding decides. Only the target as estimated is asked: turned ones have
+  // slanted walls, which no phase suits.
+  const ObstacleSet estimated(task_model, geoms, Eigen::Quaterniond::Identity());
   const Eigen::Vector3d beside(5e-4, 6e-4, 7e-4);
   Eigen::Vector3d phase = Eigen::Vector3d::Zero();
   double margin_cells = 0.5;
   for (int axis = 0; axis < 3; ++axis) {
     const Lines lines{domain, axis};
     WallCensus census(domain.Size()[lines.v()]);
-    for (const ObstacleSet& set : sets) {
-      std::vector<LineEnds> ends(static_cast<std::size_t>(lines.count()));
-      SweepLines(set, lines, beside, task.cell_m, /*judged=*/false, parallelism, progress,
-                 [&](int line, const std::vector<BlockedStretch>& stretches) {
-                   ends[static_cast<std::size_t>(line)] = EndsOf(stretches, lines, task.cell_m);
-                 });
-      census.Add(ends);
-    }
+    std::vector<LineEnds> ends(static_cast<std::size_t>(lines.count()));
+    SweepLines(estimated, lines, beside, task.cell_m, /*judged=*/false, parallelism, progress,
+               [&](int line, const std::vector<BlockedStretch>& stretches) {
+                 ends[static_cast<std::size_t>(line)] = EndsOf(stretches, lines, task.cell_m);
+               });
+    census.Add(ends);
     const LatticePhase chosen = ChoosePhase(census.Walls());
     phase[axis] = chosen.phase;
     margin_cells = std::min(margin_cells, chosen.margin);

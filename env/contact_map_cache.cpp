@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -131,9 +130,13 @@ bool StoreContactMap(const fs::path& file, const ContactMap& map) {
 }
 
 ContactMap ReadContactMap(const fs::path& file) {
+  // Maps over orientation come to hundreds of megabytes: read in one piece.
+  std::error_code error;
+  const auto size = fs::file_size(file, error);
   std::ifstream in(file, std::ios::binary);
-  std::vector<char> bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  if (!in) throw InputError(file.string(), "the contact map cannot be read");
+  std::vector<char> bytes(error ? 0 : static_cast<std::size_t>(size));
+  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (error || !in) throw InputError(file.string(), "the contact map cannot be read");
   Reader reader(bytes, file);
   std::array<char, kMagic.size()> magic{};
   reader.Get(magic.data(), magic.size());

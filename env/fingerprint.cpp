@@ -87,6 +87,9 @@ Digest ContactMapDigest(const TaskModel& task_model, Opening opening) {
   AddGeoms(model, task_model.target_geoms, task_model.target_body, digest);
   digest.Add(opening == Opening::kClosed ? 1 : 0);
   if (opening == Opening::kClosed) AddGeoms(model, task_model.lid_geoms, task_model.target_body, digest);
+  if (opening == Opening::kClosed && !task_model.tool_lid_geoms.empty()) {
+    AddGeoms(model, task_model.tool_lid_geoms, task_model.tool_body, digest);
+  }
   digest.AddReal(task_model.task.cell_m);
   const CellBox domain = DisplacementsOf(task_model.task);
   digest.AddCell(domain.min);
@@ -117,6 +120,7 @@ std::string Fingerprint(const TaskModel& task_model, Opening opening) {
   }
   digest.AddVector(task.start_offset_m);
   digest.AddVector(task.workspace_m);
+  if (!task.workspace_center_m.isZero()) digest.AddVector(task.workspace_center_m);
   digest.Add(static_cast<std::int64_t>(task.move_lengths.size()));
   for (const int length : task.move_lengths) digest.Add(length);
   digest.AddReal(task.cost.per_cell);

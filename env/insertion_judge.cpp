@@ -1,7 +1,5 @@
 #include "env/insertion_judge.h"
 
-#include <Eigen/Geometry>
-
 #include "core/direction.h"
 
 namespace feeler::env {
@@ -33,7 +31,7 @@ InsertionVerdict JudgeInsertion(const Task& task, const InsertionLimits& limits,
   InsertionVerdict verdict;
   verdict.depth_m = displacement_m.dot(axis);
   verdict.lateral_m = (displacement_m - verdict.depth_m * axis).cwiseAbs().maxCoeff();
-  verdict.angle_rad = Eigen::AngleAxisd(target_T_tool.linear()).angle();
+  verdict.angle_rad = InsertionAngle(task, target_T_tool.linear());
   // Negated comparisons, so that a pose that is not a number is never inserted.
   if (!(verdict.lateral_m <= limits.lateral_m)) {
     verdict.reason = InsertionReason::kOffToTheSide;

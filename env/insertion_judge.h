@@ -28,7 +28,7 @@ struct InsertionVerdict {
   InsertionReason reason = InsertionReason::kTooShallow;  ///< the first that applies, geometry before force and time
   double depth_m = 0.0;    ///< of the tool origin below the mouth, along the insertion direction
   double lateral_m = 0.0;  ///< the larger of the distances along the two axes across the insertion
-  double angle_rad = 0.0;  ///< between the frames
+  double angle_rad = 0.0;  ///< between the frames, or between their insertion axes where the parts turn freely
 };
 
 /// Decides from the truth alone; what the executor believes plays no part.

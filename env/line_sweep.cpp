@@ -11,15 +11,17 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// MuJoCo's convex collider decides overlaps shallower than this, measured along the normal, one way or the other.
 constexpr double kJudgeDepth_m = 2e-6;
+/// An end that lies deeper than this in another obstacle decides nothing.
+constexpr double kHiddenDepth_m = 1e-4;
 
 }  // namespace
 
-ObstacleSet::ObstacleSet(const TaskModel& model, std::vector<int> geoms, const Eigen::Quaterniond& target_orientation)
-    : task_model(&model), target_geoms(std::move(geoms)), orientation(target_orientation) {
+ObstacleSet::ObstacleSet(const TaskModel& model, FeltGeoms felt, const Eigen::Quaterniond& target_orientation)
+    : task_model(&model), geoms(std::move(felt)), orientation(target_orientation) {
   const Pose rotation = MakePose(Eigen::Vector3d::Zero(), orientation);
-  for (const int tool_geom : model.tool_geoms) {
+  for (const int tool_geom : geoms.tool) {
     const ConvexShape tool(*model.model, tool_geom, GeomInBody(*model.model, tool_geom, model.tool_body));
-    for (const int target_geom : target_geoms) {
+    for (const int target_geom : geoms.target) {
       const Pose pose = rotation * GeomInBody(*model.model, target_geom, model.target_body);
       if (model.model->geom_type[target_geom] == mjGEOM_PLANE) {
         const Eigen::Vector3d normal = pose.linear().col(2);
@@ -34,7 +36,7 @@ ObstacleSet::ObstacleSet(const TaskModel& model, std::vector<int> geoms, const E
 }
 
 LineSweep::LineSweep(const ObstacleSet& set, double accuracy_m)
-    : set_(set), accuracy_m_(accuracy_m), judge_(*set.task_model, set.target_geoms, set.orientation) {}
+    : set_(set), accuracy_m_(accuracy_m), judge_(*set.task_model, set.geoms, set.orientation) {}
 
 double LineSweep::JudgeEnd(int tool_geom, int target_geom, int axis, Eigen::Vector3d& point_m, double end_m,
                            double inside_m, double probe_m) {
@@ -71,22 +73,38 @@ double LineSweep::JudgeEnd(int tool_geom, int target_geom, int axis, Eigen::Vect
   return judged;
 }
 
-void LineSweep::Judge(int tool_geom, int target_geom, int axis, Eigen::Vector3d point_m, Cut& cut) {
+bool LineSweep::Hidden(double end_m) const {
+  return std::any_of(cuts_.begin(), cuts_.end(), [&](const FoundCut& found) {
+    return found.cut.low_m < end_m - kHiddenDepth_m && found.cut.high_m > end_m + kHiddenDepth_m;
+  });
+}
+
+void LineSweep::Judge(const ObstacleSet::Obstacle& obstacle, int axis, Eigen::Vector3d point_m, Cut& cut) {
   const double middle = 0.5 * (cut.low_m + cut.high_m);
-  const auto probe = [&](double slope) { return std::max(accuracy_m_, kJudgeDepth_m / std::max(slope, 1e-3)); };
-  const double low = JudgeEnd(tool_geom, target_geom, axis, point_m, cut.low_m, middle, probe(cut.low_slope));
-  const double high = JudgeEnd(tool_geom, target_geom, axis, point_m, cut.high_m, middle, probe(cut.high_slope));
+  const auto judge = [&](double end_m, double slope) {
+    if (Hidden(end_m)) return end_m;
+    const double probe_m = std::max(accuracy_m_, kJudgeDepth_m / std::max(slope, 1e-3));
+    return JudgeEnd(obstacle.tool_geom, obstacle.target_geom, axis, point_m, end_m, middle, probe_m);
+  };
+  const double low = judge(cut.low_m, cut.low_slope);
+  const double high = judge(cut.high_m, cut.high_slope);
   cut.low_m = low;
   cut.high_m = high;
 }
 
 const std::vector<BlockedStretch>& LineSweep::Sweep(int axis, const Eigen::Vector3d& point_m, bool judged) {
   stretches_.clear();
+  cuts_.clear();
   for (const ObstacleSet::Obstacle& obstacle : set_.obstacles) {
-    auto cut = obstacle.shape.CutBy(axis, point_m);
-    if (!cut) continue;
-    if (judged) Judge(obstacle.tool_geom, obstacle.target_geom, axis, point_m, *cut);
-    if (cut->low_m < cut->high_m) stretches_.push_back({cut->low_m, cut->high_m});
+    if (const auto cut = obstacle.shape.CutBy(axis, point_m)) cuts_.push_back({&obstacle, *cut});
+  }
+  if (judged) {
+    judged_ = cuts_;
+    for (FoundCut& found : judged_) Judge(*found.obstacle, axis, point_m, found.cut);
+    cuts_.swap(judged_);
+  }
+  for (const FoundCut& found : cuts_) {
+    if (found.cut.low_m < found.cut.high_m) stretches_.push_back({found.cut.low_m, found.cut.high_m});
   }
   for (const ObstacleSet::HalfSpace& space : set_.half_spaces) {
     Eigen::Vector3d across = point_m;

@@ -21,7 +21,7 @@ struct BlockedStretch {
 /// All configuration-space obstacles of a task at one orientation of the target. Immutable; shared by threads.
 class ObstacleSet {
  public:
-  ObstacleSet(const TaskModel& task_model, std::vector<int> target_geoms, const Eigen::Quaterniond& orientation);
+  ObstacleSet(const TaskModel& task_model, FeltGeoms geoms, const Eigen::Quaterniond& orientation);
 
   struct Obstacle {
     int tool_geom;
@@ -36,16 +36,16 @@ class ObstacleSet {
     double offset_m;
   };
   const TaskModel* task_model;
-  std::vector<int> target_geoms;
+  FeltGeoms geoms;
   Eigen::Quaterniond orientation;
   std::vector<Obstacle> obstacles;
   std::vector<HalfSpace> half_spaces;
 };
 
 /// Sweeps the tool along whole lines. The interval in which a line meets a pair of convex geoms follows from their
-/// support points (ConvexObstacle); MuJoCo's collision detection is asked just inside and just outside both its ends,
-/// and where it judges otherwise its boundary, found by bisection, is what counts.
-/// One thread at a time; make one per thread.
+/// support points (ConvexObstacle); MuJoCo's collision detection is asked just inside and just outside both its ends
+/// (those that another pair does not hide), and where it judges otherwise its boundary, found by bisection, is what
+/// counts. One thread at a time; make one per thread.
 class LineSweep {
  public:
   /// `accuracy_m`: how close to an end MuJoCo is asked.
@@ -60,13 +60,20 @@ class LineSweep {
   double largest_correction_m() const { return largest_correction_m_; }
 
  private:
-  void Judge(int tool_geom, int target_geom, int axis, Eigen::Vector3d point_m, Cut& cut);
+  struct FoundCut {
+    const ObstacleSet::Obstacle* obstacle;
+    Cut cut;
+  };
+  bool Hidden(double end_m) const;
+  void Judge(const ObstacleSet::Obstacle& obstacle, int axis, Eigen::Vector3d point_m, Cut& cut);
   double JudgeEnd(int tool_geom, int target_geom, int axis, Eigen::Vector3d& point_m, double end_m, double inside_m,
                   double probe_m);
 
   const ObstacleSet& set_;
   double accuracy_m_;
   OverlapJudge judge_;
+  std::vector<FoundCut> cuts_;    ///< of the line being swept
+  std::vector<FoundCut> judged_;  ///< the same with ends as MuJoCo sees them
   std::vector<BlockedStretch> stretches_;
   std::int64_t corrections_ = 0;
   double largest_correction_m_ = 0.0;

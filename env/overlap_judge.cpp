@@ -15,12 +15,11 @@ void Place(mjData& data, int geom, const Pose& pose) {
 
 }  // namespace
 
-OverlapJudge::OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
-                           const Eigen::Quaterniond& orientation)
+OverlapJudge::OverlapJudge(const TaskModel& task_model, FeltGeoms geoms, const Eigen::Quaterniond& orientation)
     : model_(mj_copyModel(nullptr, task_model.model.get()), ModelDeleter()),
       data_(MakeData(*model_)),
-      tool_geoms_(task_model.tool_geoms),
-      target_geoms_(std::move(target_geoms)),
+      tool_geoms_(std::move(geoms.tool)),
+      target_geoms_(std::move(geoms.target)),
       tool_position_m_(static_cast<std::size_t>(model_->ngeom), Eigen::Vector3d::Zero()) {
   // The default tolerance of the convex collider, 1e-6 m, is half of the accuracy asked of travel distances.
   model_->opt.mpr_tolerance = 1e-8;

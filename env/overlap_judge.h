@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/pose.h"
@@ -18,9 +19,13 @@ namespace feeler::env {
 /// one per thread.
 class OverlapJudge {
  public:
-  /// `orientation`: of the target in the estimated target frame. `target_geoms`: ids in task_model.model.
-  OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
+  /// `orientation`: of the target in the estimated target frame. `geoms`: ids in task_model.model.
+  OverlapJudge(const TaskModel& task_model, FeltGeoms geoms,
                const Eigen::Quaterniond& orientation = Eigen::Quaterniond::Identity());
+  /// The geoms of the tool that can collide, and these of the target.
+  OverlapJudge(const TaskModel& task_model, std::vector<int> target_geoms,
+               const Eigen::Quaterniond& orientation = Eigen::Quaterniond::Identity())
+      : OverlapJudge(task_model, FeltGeoms{task_model.tool_geoms, std::move(target_geoms)}, orientation) {}
 
   /// Of one pair of geoms (ids in the model).
   bool Overlap(int tool_geom, int target_geom, const Eigen::Vector3d& displacement_m);

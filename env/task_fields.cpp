@@ -21,7 +21,7 @@ constexpr std::array kNumericFields = {
     "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth", "feeler_cell",
     "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle", "feeler_cost",
     "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",  "feeler_probe_speed",
-    "feeler_time_per_move",     "feeler_time_per_contact"};
+    "feeler_time_per_move",     "feeler_time_per_contact",   "feeler_workspace_center"};
 constexpr std::array kTextFields = {"feeler_axes", "feeler_insertion_axis", "feeler_goal"};
 
 constexpr int kMaxCells = 64;       ///< hypotheses along an axis; beyond it a number is a slip, not a wish
@@ -181,6 +181,15 @@ void ReadMotion(const Fields& fields, Task& task) {
     fields.CheckRange("feeler_start_offset", value, -kMaxLength_m, kMaxLength_m);
   task.workspace_m = fields.Vector("feeler_workspace", "half extents of the tool's workspace around the start, m");
   for (const double value : task.workspace_m) fields.CheckRange("feeler_workspace", value, 0, kMaxLength_m);
+  if (fields.HasNumeric("feeler_workspace_center")) {
+    task.workspace_center_m = fields.Vector("feeler_workspace_center", "the centre of the workspace from the start, m");
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(task.workspace_center_m[i]) <= task.workspace_m[i] - 0.5 * task.cell_m) continue;
+      if (task.workspace_center_m[i] == 0) continue;
+      fields.FailNumber("feeler_workspace_center", "leaves the start outside of the workspace",
+                        "each number is less than that of feeler_workspace");
+    }
+  }
   for (const UncertainAxis& axis : task.axes) {
     if (!axis.angular() && task.workspace_m[static_cast<int>(axis.kind)] < task.cell_m) {
       fields.FailNumber("feeler_workspace",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numbers>
 #include <string_view>
 
 #include "core/error.h"
@@ -43,12 +44,12 @@ void SortGeoms(TaskModel& task_model, const std::string& where) {
     const bool can_collide = model.geom_contype[geom] != 0 || model.geom_conaffinity[geom] != 0;
     const bool of_tool = BelongsTo(model, geom, task_model.tool_body);
     const bool of_target = BelongsTo(model, geom, task_model.target_body);
-    const bool lid = of_target && name.starts_with("lid");
+    const bool lid = (of_target || of_tool) && name.starts_with("lid");
     if (lid && can_collide) {
       throw InputError(fmt::format("{}: <geom name=\"{}\">", where, name), "a lid collides in physics",
                        "set contype=\"0\" conaffinity=\"0\"");
     }
-    if (lid) task_model.lid_geoms.push_back(geom);
+    if (lid) (of_tool ? task_model.tool_lid_geoms : task_model.lid_geoms).push_back(geom);
     if (!can_collide || (!of_tool && !of_target)) continue;
     const int type = model.geom_type[geom];
     if (type == mjGEOM_HFIELD || (type == mjGEOM_PLANE && of_tool)) {
@@ -106,22 +107,68 @@ void CheckGeometry(const TaskModel& task_model, const std::string& where) {
     }
   }
 
-  std::vector<int> closed_geoms = task_model.target_geoms;
-  closed_geoms.insert(closed_geoms.end(), task_model.lid_geoms.begin(), task_model.lid_geoms.end());
-  OverlapJudge closed(task_model, closed_geoms);
   const Cell cuboid = LargestCuboid(task);
   const Eigen::Vector3d half_m = (cuboid - Cell::Ones()).cast<double>() * (task.cell_m / 2);
-  for (int corner = 0; corner < 27; ++corner) {
-    const Eigen::Vector3d sign(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
-    if (closed.Overlap(task.start_offset_m - sign.cwiseProduct(half_m))) {
-      throw InputError(numeric("feeler_start_offset"),
-                       "the tool starts in collision with the target under a hypothesis of the largest extents",
-                       "start further away or lower feeler_max_cells");
+  for (const Eigen::Quaterniond& orientation : TargetOrientations(task)) {
+    OverlapJudge closed(task_model, GeomsOf(task_model, Opening::kClosed), orientation);
+    for (int corner = 0; corner < 27; ++corner) {
+      const Eigen::Vector3d sign(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
+      if (closed.Overlap(task.start_offset_m - sign.cwiseProduct(half_m))) {
+        throw InputError(numeric("feeler_start_offset"),
+                         "the tool starts in collision with the target under a hypothesis of the largest extents",
+                         "start further away or lower feeler_max_cells");
+      }
     }
   }
 }
 
+/// Whether the tool, aligned and anywhere on its way in, is free of contact at every turn about the insertion axis.
+bool TurnsFreely(const TaskModel& task_model) {
+  const Task& task = task_model.task;
+  constexpr int kTurns = 36;  // 10 degrees each: no multiple of the sides of a polygon that is meant to be round
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  for (int turn = 1; turn < kTurns; ++turn) {
+    // Turning the target one way is turning the tool the other way.
+    const Eigen::Quaterniond orientation(Eigen::AngleAxisd(2 * std::numbers::pi * turn / kTurns, inward));
+    OverlapJudge judge(task_model, GeomsOf(task_model, Opening::kOpen), orientation);
+    for (const double share : {0.1, 0.5, 0.98}) {
+      if (judge.Overlap(inward * (share * task.insertion_depth_m))) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
+
+std::string_view ToString(Opening opening) { return opening == Opening::kClosed ? "closed" : "open"; }
+
+FeltGeoms GeomsOf(const TaskModel& task_model, Opening opening) {
+  FeltGeoms geoms{task_model.tool_geoms, task_model.target_geoms};
+  if (opening == Opening::kOpen) return geoms;
+  geoms.tool.insert(geoms.tool.end(), task_model.tool_lid_geoms.begin(), task_model.tool_lid_geoms.end());
+  geoms.target.insert(geoms.target.end(), task_model.lid_geoms.begin(), task_model.lid_geoms.end());
+  return geoms;
+}
+
+std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
+  const auto angles = [&](AxisKind kind) {
+    std::vector<double> values = {0.0};
+    for (const UncertainAxis& axis : task.axes) {
+      if (axis.kind != kind) continue;
+      values.clear();
+      for (int k = 0; k < axis.max_cells; ++k) values.push_back((k - (axis.max_cells - 1) / 2.0) * axis.resolution);
+    }
+    return values;
+  };
+  std::vector<Eigen::Quaterniond> orientations;
+  for (const double yaw : angles(AxisKind::kYaw)) {
+    for (const double pitch : angles(AxisKind::kPitch)) {
+      orientations.emplace_back(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()));
+    }
+  }
+  return orientations;
+}
 
 fs::path ModelsFolder() {
   const char* folder = std::getenv("FEELER_MODELS");
@@ -140,6 +187,7 @@ TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, con
   task_model.task.world_T_target = BodyAtRest(model, task_model.target_body);
   task_model.task.name = fs::path(name).stem().string();
   CheckGeometry(task_model, name);
+  task_model.task.turns_freely = TurnsFreely(task_model);
   return task_model;
 }
 

@@ -2,9 +2,11 @@
 
 #include <mujoco/mujoco.h>
 
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/task.h"
@@ -23,8 +25,24 @@ struct TaskModel {
   int target_body = -1;
   std::vector<int> tool_geoms;    ///< can collide
   std::vector<int> target_geoms;  ///< can collide
-  std::vector<int> lid_geoms;     ///< close the opening in the contact map, ignored by physics
+  std::vector<int> lid_geoms;       ///< of the target; close the opening in the contact map, ignored by physics
+  std::vector<int> tool_lid_geoms;  ///< the same of a tool that has the opening
 };
+
+/// Whether the opening is closed by its lid geoms.
+enum class Opening { kClosed, kOpen };
+std::string_view ToString(Opening opening);
+
+/// Geoms of tool and target that are felt.
+struct FeltGeoms {
+  std::vector<int> tool;
+  std::vector<int> target;
+};
+FeltGeoms GeomsOf(const TaskModel& task_model, Opening opening);
+
+/// Orientations of the target relative to the estimate, lexicographic in the angular axes of the task (one identity if
+/// there are none), at their largest extents: Rz(yaw) * Ry(pitch), each angle (k - (n - 1)/2) * resolution.
+std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task);
 
 /// Where models/ lies: $FEELER_MODELS if set, else the folder of the source tree the program was built from.
 std::filesystem::path ModelsFolder();

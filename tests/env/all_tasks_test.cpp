@@ -35,7 +35,7 @@ TEST_P(EveryTask, OpensAndMakesAScene) {
   const Scene scene = BuildScene(task);
   EXPECT_EQ(scene.tool_geoms.size(), task.tool_geoms.size());
   EXPECT_EQ(scene.target_geoms.size(), task.target_geoms.size());
-  EXPECT_EQ(scene.lid_geoms.size(), task.lid_geoms.size());
+  EXPECT_EQ(scene.lid_geoms.size(), task.lid_geoms.size() + task.tool_lid_geoms.size());
 }
 
 TEST_P(EveryTask, WallsKeepOffTheLatticeAndTheStartIsFree) {
