@@ -156,7 +156,8 @@ ExperimentResult RunAcceptanceGuardedMoves(const ExperimentRequest& request) {
   setup_options.progress = request.map_progress;
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup("plug", setup_options);
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(setup);
-  const env::ObstacleSet obstacles(setup.model, setup.model.target_geoms, Eigen::Quaterniond::Identity());
+  const env::ObstacleSet obstacles(setup.model, {setup.model.tool_geoms, setup.model.target_geoms},
+                                   Eigen::Quaterniond::Identity());
 
   ExperimentResult result;
   result.seeds = {request.seed};
