@@ -108,6 +108,7 @@ void Run(const Flags& flags, Session& session) {
   options.noise = flags.noise;
   options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
   options.confirm_limit_m = flags.confirm_limit_m;
+  options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
   const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };

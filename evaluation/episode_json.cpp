@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "evaluation/replay_json.h"
 
 namespace feeler::evaluation {
 namespace {
@@ -66,6 +67,7 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["timing"] = {{"plan_cpu_s", record.timing.plan_cpu_s},
                     {"transfer_cpu_s", record.timing.transfer_cpu_s},
                     {"cpu_s", record.timing.cpu_s}};
+  if (record.replay) json["replay"] = ReplayJson(record);
   return json;
 }
 

@@ -23,6 +23,18 @@ struct MoveRecord {
   double duration_s = 0.0;  ///< on the clock of the robot, what came before it since the last motion included
 };
 
+/// One move of the policy and its answer: a branch of the policy graph that was taken.
+struct DecisionRecord {
+  int attempt = 0;          ///< 0: the policy's own walk; counts up with every plan of the fallback ladder
+  int motions = 0;          ///< motions of `moves` that were made when the answer was known
+  std::string direction;    ///< "+x" ...
+  int cells = 0;            ///< asked for
+  int travelled_cells = 0;  ///< answered
+  bool contact = false;     ///< answered
+  int outcomes = 0;         ///< different answers that the hypotheses left before it could give
+  std::vector<int> left;    ///< the hypotheses that explain it: indices into the problem of the attempt, increasing
+};
+
 /// One rung of the fallback ladder that was used.
 struct LadderRecord {
   std::string rung;
@@ -38,6 +50,9 @@ struct ExecutionRecord {
   std::array<double, 3> half_width_m{};  ///< of the estimate, per axis, as the evidence leaves it
   int violations = 0;                    ///< touches that the estimate does not explain
   std::vector<MoveRecord> moves;
+  std::vector<DecisionRecord> decisions;
+  int attempts = 0;      ///< walks of a policy that were begun
+  int hypotheses = 0;    ///< of the first of them
   int policy_moves = 0;  ///< guarded moves that the policy asked for (merged ones counted one by one)
   int contacts = 0;      ///< motions that ended at a contact before the insertion
   int grazes = 0;        ///< times an edge was met (or missed) by less than a cell and the lattice shifted

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <utility>
 
 #include "execution/continuous_travel.h"
 #include "execution/fall_in.h"
@@ -65,6 +67,7 @@ policies::Decision Localizer::Ask() {
 
 policies::Insert Localizer::Run() {
   policy_.Begin(problem_);
+  if (record_.attempts++ == 0) record_.hypotheses = static_cast<int>(problem_.hypotheses.size());
   while (true) {
     const policies::Decision decision = Ask();
     if (const auto* insert = std::get_if<policies::Insert>(&decision)) return *insert;
@@ -231,12 +234,44 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tol
       const double travel = PredictTravel(*problem_.map, best, touch.start, touch.direction);
       anchor_[axis] = best.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
+    const int outcomes = CountOutcomes(move);
     Settle(*problem_.map, robot_, move, touch, match.outcome, matching, tracked_);
+    LogDecision(move, match.outcome, outcomes);
     robot_ += match.outcome.cells * UnitCell(move.direction);
     return true;
   }
   if (!matches.empty()) throw LostTrack("policy: no branch for any outcome that explains the reading");
   return false;
+}
+
+int Localizer::CountOutcomes(const GuardedMove& move) const {
+  std::set<std::pair<int, bool>> outcomes;
+  for (const TrackedHypothesis& t : tracked_) {
+    const Outcome outcome = problem_.map->Predict(robot_ - t.hypothesis.offset, move, t.hypothesis.orientation);
+    outcomes.emplace(outcome.cells, outcome.contact);
+  }
+  return static_cast<int>(outcomes.size());
+}
+
+void Localizer::LogDecision(const GuardedMove& move, const Outcome& outcome, int outcomes) {
+  DecisionRecord decision;
+  decision.attempt = record_.attempts - 1;
+  decision.motions = static_cast<int>(record_.moves.size());
+  decision.direction = ToString(move.direction);
+  decision.cells = move.cells;
+  decision.travelled_cells = outcome.cells;
+  decision.contact = outcome.contact;
+  decision.outcomes = outcomes;
+  // Those left stand in the order of the problem.
+  std::size_t index = 0;
+  for (const TrackedHypothesis& t : tracked_) {
+    while (problem_.hypotheses.at(index).offset != t.hypothesis.offset ||
+           problem_.hypotheses[index].orientation != t.hypothesis.orientation) {
+      ++index;
+    }
+    decision.left.push_back(static_cast<int>(index++));
+  }
+  record_.decisions.push_back(std::move(decision));
 }
 
 bool Localizer::FoundInside() {

@@ -58,6 +58,10 @@ class Localizer {
   /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
   /// the tolerance (cells).
   bool TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells);
+  /// Writes the answer to a move of the policy into the record. `outcomes`: that could have been.
+  void LogDecision(const GuardedMove& move, const Outcome& outcome, int outcomes);
+  /// Different outcomes of a move under the hypotheses left.
+  int CountOutcomes(const GuardedMove& move) const;
   /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
   bool FoundInside();
   /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.

@@ -24,6 +24,21 @@ bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
          error.angle_rad <= tolerance.angle_rad;
 }
 
+/// While it lives the recorder sees every physics step.
+class Watched {
+ public:
+  Watched(env::SimulatedRobot& robot, ReplayRecorder& recorder) : robot_(robot) {
+    robot_.SetObserver([&recorder](const env::World& world) { recorder.See(world); }, 0.0);
+    recorder.See(robot_.world());
+  }
+  ~Watched() { robot_.SetObserver({}, 0.0); }
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+
+ private:
+  env::SimulatedRobot& robot_;
+};
+
 }  // namespace
 
 std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
@@ -80,10 +95,8 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
 
   env::SimulatedRobot& robot = environment_->robot();
   ReplayRecorder recorder(robot.world().scene());
-  if (options_.replay) {
-    robot.SetObserver([&](const env::World& world) { recorder.See(world); }, 0.0);
-    recorder.See(robot.world());
-  }
+  std::optional<Watched> watched;
+  if (options_.replay) watched.emplace(robot, recorder);
 
   const double transfer_start_s = ThreadCpuSeconds();
   const MotionResult transfer =
@@ -107,10 +120,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
                               (transfer.detail.empty() ? "" : ", " + transfer.detail);
   }
 
-  if (options_.replay) {
-    robot.SetObserver({}, 0.0);
-    record.replay = recorder.Take(robot.world());
-  }
+  if (options_.replay) record.replay = recorder.Take(robot.world());
 
   // The score: from here on the truth may be looked at.
   const env::InsertionVerdict verdict = environment_->Judge();

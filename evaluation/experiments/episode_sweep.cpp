@@ -220,6 +220,7 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
   options.noise = setting.noise;
   options.ladder = setting.ladder && workflow::UsesLadder(setting.policy);
   options.confirm_limit_m = setting.confirm_limit_m;
+  options.replay = true;
   const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, world.database);
   take_over();
   workflow::RunEpisodes(
