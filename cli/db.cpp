@@ -25,8 +25,8 @@ struct Flags {
   bool json = false;
 };
 
-nlohmann::json ProblemJson(const policies::StoredProblem& problem) {
-  return {{"extents", planner::ToString(problem.extents)},
+nlohmann::json ProblemJson(const policies::StoredProblem& problem, const std::vector<AxisKind>& axes) {
+  return {{"extents", planner::ToString(problem.extents, axes)},
           {"hypotheses", problem.extents.Count()},
           {"status", problem.status},
           {"solver", problem.solver},
@@ -53,7 +53,7 @@ workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags
 }
 
 policies::StoredProblem Find(policies::Database& database, const Flags& flags) {
-  auto stored = database.Get(planner::ParseExtents(flags.extents));
+  auto stored = database.Get(planner::ParseExtents(flags.extents, database.identity().axes));
   if (!stored) {
     throw InputError(flags.file, "holds no problem " + flags.extents, "see feeler db list " + flags.file);
   }
@@ -94,22 +94,23 @@ void List(const Flags& flags) {
   const auto problems = database.List();
   if (flags.json) {
     nlohmann::json json = nlohmann::json::array();
-    for (const auto& problem : problems) json.push_back(ProblemJson(problem));
+    for (const auto& problem : problems) json.push_back(ProblemJson(problem, database.identity().axes));
     PrintJson(json);
     return;
   }
   fmt::print("{:<10} {:>10} {:<16} {:>13} {:>11} {:>7} {:>10} {:>9}\n", "extents", "hypotheses", "status",
              "expected cost", "lower bound", "ratio", "expansions", "CPU s");
   for (const auto& p : problems) {
-    fmt::print("{:<10} {:>10} {:<16} {:>13.3f} {:>11.3f} {:>7.4f} {:>10} {:>9.4f}\n", planner::ToString(p.extents),
-               p.extents.Count(), p.status, p.expected_cost, p.lower_bound, p.Ratio(), p.expansions, p.cpu_s);
+    fmt::print("{:<10} {:>10} {:<16} {:>13.3f} {:>11.3f} {:>7.4f} {:>10} {:>9.4f}\n",
+               planner::ToString(p.extents, database.identity().axes), p.extents.Count(), p.status, p.expected_cost,
+               p.lower_bound, p.Ratio(), p.expansions, p.cpu_s);
   }
 }
 
 void Show(const Flags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::StoredProblem stored = Find(database, flags);
-  nlohmann::json json = ProblemJson(stored);
+  nlohmann::json json = ProblemJson(stored, database.identity().axes);
   if (stored.policy) {
     const workflow::PlanningSetup setup = SetupFor(database, flags);
     const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
@@ -190,7 +191,7 @@ void AddDbCommand(CLI::App& app, Session& session) {
   }
   {
     auto [command, flags] = add("show", "One problem and its policy's figures");
-    command->add_option("--extents", flags->extents, "e.g. 7x7x5")->required();
+    command->add_option("--extents", flags->extents, "one count per axis of the task, e.g. 7x7x5")->required();
     add_task(command, flags);
     command->callback([flags = flags] { Show(*flags); });
   }
@@ -201,7 +202,7 @@ void AddDbCommand(CLI::App& app, Session& session) {
   }
   {
     auto [command, flags] = add("export", "One policy as JSON (docs/file-formats.md)");
-    command->add_option("--extents", flags->extents, "e.g. 7x7x5")->required();
+    command->add_option("--extents", flags->extents, "one count per axis of the task, e.g. 7x7x5")->required();
     command->add_option("--out", flags->out, "file to write (default: standard output)");
     add_task(command, flags);
     command->callback([flags = flags] { Export(*flags); });

@@ -39,12 +39,12 @@ struct Flags {
 
 planner::Problem TaskProblem(const Flags& flags, const std::string& task, workflow::PlanningSetupOptions options,
                              const policies::Database* database) {
-  const planner::Extents extents = planner::ParseExtents(flags.extents);
   ProgressBar bar("contact map");
   options.jobs = ParseJobs(flags.jobs);
   options.progress = bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(task, options);
   if (database != nullptr) database->RequireFingerprint(setup.task().name, setup.fingerprint);
+  const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
   workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
   return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
 }
@@ -52,7 +52,7 @@ planner::Problem TaskProblem(const Flags& flags, const std::string& task, workfl
 /// A policy of the database at --extents.
 planner::ExpandedPolicy FromDatabase(const Flags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.db);
-  const auto stored = database.Get(planner::ParseExtents(flags.extents));
+  const auto stored = database.Get(planner::ParseExtents(flags.extents, database.identity().axes));
   if (!stored) throw InputError(flags.db, "holds no problem " + flags.extents, "see feeler db list " + flags.db);
   if (!stored->policy) throw NegativeResult(flags.db, flags.extents + " holds no complete policy");
   const policies::DatabaseIdentity& identity = database.identity();
@@ -124,7 +124,7 @@ void AddPolicyCommand(CLI::App& app, Session& /*session*/) {
   command->add_option("--policy", flags->policy, "policy file (docs/file-formats.md)");
   command->add_option("--problem", flags->problem, "lattice problem file that the policy file was made for");
   command->add_option("--task", flags->task, "task that the policy file was made for; with --db: the task's file");
-  command->add_option("--extents", flags->extents, "hypotheses per axis, e.g. 7x7x5 (with --task or --db)");
+  command->add_option("--extents", flags->extents, "hypotheses per axis of the task, e.g. 7x7x5 (with --task or --db)");
   command->add_option("--db", flags->db, "database to take the policy from");
   command->add_option("--opening", flags->opening, "closed or open while localizing (with --task)")
       ->capture_default_str();

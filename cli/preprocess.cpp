@@ -59,6 +59,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   const planner::ProblemFamily family = FamilyFor(flags.family, setup.task());
   workflow::RequireWithinTask(family, setup.task());
 
+  ProgressBar table_bar("tables");
+  options.solver.on_tables = table_bar.Callback();
   ProgressBar bar("problems");
   options.progress = bar.Callback();
   const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out);
@@ -86,7 +88,8 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--out", flags->out, "database file; an existing one is continued")->required();
   command->add_option("--family", flags->family,
-                      "problems, e.g. 2..15x2..15x2..15, or a JSON file of them (default: the task's ranges)");
+                      "problems, a range or count per axis of the task, e.g. 2..15x2..15x2..15, or a JSON file of them "
+                      "(default: the task's ranges)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--cost", flags->cost, "distance (the task's feeler_cost) or time, in seconds")
       ->capture_default_str();

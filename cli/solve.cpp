@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <thread>
 
@@ -60,6 +61,13 @@ planner::Problem LoadProblem(const Flags& flags) {
   return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
 }
 
+/// "[x, y, z]", and the orientation where there are several.
+std::string NameOf(const planner::Problem& problem, int hypothesis) {
+  const planner::Hypothesis& h = problem.hypotheses[static_cast<std::size_t>(hypothesis)];
+  const std::string place = fmt::format("[{}, {}, {}]", h.offset.x(), h.offset.y(), h.offset.z());
+  return problem.map->orientations() == 1 ? place : fmt::format("{} orientation {}", place, h.orientation);
+}
+
 /// JSON has no infinity: null.
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
@@ -91,15 +99,20 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     fmt::print(stderr, "{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
                row.lower_bound, row.upper_bound, row.Ratio());
   };
-  const planner::SolverResult result = planner::Solve(problem, options);
+  planner::Validate(options);
+  ProgressBar table_bar("tables");
+  options.on_tables = table_bar.Callback();
+  const std::clock_t tables_start = std::clock();
+  const auto tables = planner::BuildPlanningTables(problem, options, ParseJobs(flags.jobs));
+  const double tables_cpu_s = static_cast<double>(std::clock() - tables_start) / CLOCKS_PER_SEC;
+  table_bar.Finish();
+  const planner::SolverResult result = planner::Solve(problem, options, tables);
 
   if (result.status == planner::SolverStatus::kUnlocalizable) {
     fmt::print(stderr, "feeler: {} pairs of hypotheses cannot be told apart by any probe:\n",
                result.indistinguishable.size());
     for (const auto& [i, j] : result.indistinguishable) {
-      const auto& a = problem.hypotheses[static_cast<std::size_t>(i)].offset;
-      const auto& b = problem.hypotheses[static_cast<std::size_t>(j)].offset;
-      fmt::print(stderr, "  {} [{}, {}, {}] and {} [{}, {}, {}]\n", i, a.x(), a.y(), a.z(), j, b.x(), b.y(), b.z());
+      fmt::print(stderr, "  {} {} and {} {}\n", i, NameOf(problem, i), j, NameOf(problem, j));
     }
   }
   if (result.complete() && !flags.out.empty())
@@ -123,6 +136,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                {"expansions", result.expansions},
                {"cpu_s", result.cpu_s},
                {"wall_s", result.wall_s},
+               {"tables_cpu_s", tables_cpu_s},
                {"policy_nodes", result.complete() ? result.policy->nodes.size() : 0},
                {"indistinguishable", pairs}});
   } else {
@@ -137,14 +151,14 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   auto flags = std::make_shared<Flags>();
   CLI::App* command = app.add_subcommand("solve", "Solve one problem; prints the bounds as they close");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");
-  command->add_option("--extents", flags->extents, "hypotheses per axis, e.g. 7x7x5 (with --task)");
+  command->add_option("--extents", flags->extents, "hypotheses per axis of the task, e.g. 7x7x5 (with --task)");
   command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
   command->add_option("--cost", flags->cost, "distance (the task's or file's weights) or time, in seconds")
       ->capture_default_str();
   command->add_option("--out", flags->out, "policy file to write");
-  command->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
+  command->add_option("--jobs", flags->jobs, "threads, for contact map and tables")->capture_default_str();
   command->add_flag("--json", flags->json, "print the result as JSON");
   flags->solver.AddTo(*command);
   command->callback([command, flags, &session] { Run(*command, *flags, session); });

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <mutex>
@@ -51,6 +52,7 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
   if (setup.cost_kind == CostKind::kTime) settings["cost"] = ToString(setup.cost_kind);
   policies::DatabaseIdentity identity;
   identity.task = setup.task().name;
+  identity.axes = planner::AxesOf(setup.task());
   identity.fingerprint = setup.fingerprint;
   identity.opening = env::ToString(setup.opening);
   identity.goal = ToString(setup.task().goal);
@@ -61,12 +63,15 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
 }
 
 void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
-  const Cell largest = LargestCuboid(task);
+  std::array<int, planner::kAxisKinds> largest = {1, 1, 1, 1, 1};
+  for (const UncertainAxis& axis : task.axes) largest[static_cast<std::size_t>(axis.kind)] = axis.max_cells;
   for (const planner::Extents& extents : family.problems) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (extents[axis] >= 1 && extents[axis] <= largest[axis]) continue;
-      throw InputError("problem " + planner::ToString(extents),
-                       fmt::format("task {} allows 1..{} cells along {}", task.name, largest[axis], "xyz"[axis]),
+    for (int axis = 0; axis < planner::kAxisKinds; ++axis) {
+      const int most = largest[static_cast<std::size_t>(axis)];
+      if (extents[axis] >= 1 && extents[axis] <= most) continue;
+      throw InputError("problem " + planner::ToString(extents, task),
+                       fmt::format("task {} allows 1..{} {} along {}", task.name, most, axis < 3 ? "cells" : "angles",
+                                   ToString(static_cast<AxisKind>(axis))),
                        "change the family, or the ranges in the task file");
     }
   }
@@ -108,7 +113,7 @@ DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Databa
       const policies::RowVerification row = policies::VerifyRow(*stored, problem);
       error = std::abs(row.replayed_cost - stored->expected_cost);
       hypotheses = static_cast<int>(problem.hypotheses.size());
-      if (!row.valid()) faults[i] = planner::ToString(stored->extents) + ": " + row.fault;
+      if (!row.valid()) faults[i] = planner::ToString(stored->extents, setup.task()) + ": " + row.fault;
     }
     const std::lock_guard lock(mutex);
     if (hypotheses > 0) ++result.policies;

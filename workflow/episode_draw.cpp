@@ -32,11 +32,7 @@ void MoveOutside(const Task& task, const planner::Extents& cuboid, RandomStream&
 }  // namespace
 
 std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid) {
-  std::vector<int> extents;
-  for (const UncertainAxis& axis : task.axes) {
-    extents.push_back(axis.angular() ? axis.max_cells : cuboid[static_cast<int>(axis.kind)]);
-  }
-  return extents;
+  return planner::CountsAlong(planner::AxesOf(task), cuboid);
 }
 
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,

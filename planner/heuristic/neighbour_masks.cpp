@@ -20,6 +20,17 @@ Bits256 WithNeighbourInWindow(const Bits256& bits, const Cell& by) {
 
 }  // namespace
 
+Bits256 MembersWithNeighbour(const Bits256& bits, const Cell& corner, const Bits256& others, const Cell& other_corner,
+                             const Cell& by) {
+  const Cell moved = corner + by - other_corner;  // where the window's corner lies in the other window
+  if (moved.z() != 0 || std::abs(moved.x()) > 15 || std::abs(moved.y()) > 15) return {};
+  const std::uint64_t row = moved.x() >= 0 ? 0xFFFFU >> moved.x() : 0xFFFFU << -moved.x() & 0xFFFFU;
+  const std::uint64_t rows = row * 0x0001000100010001;
+  const Bits256 columns{{rows, rows, rows, rows}};
+  const int down = moved.x() + 16 * moved.y();
+  return bits & columns & (down >= 0 ? others.Down(down) : others.Up(-down));
+}
+
 void NeighbourMasks(const HypothesisSets& sets, SetId set, const std::array<Cell, 6>& neighbours,
                     std::vector<std::uint8_t>& masks) {
   masks.clear();

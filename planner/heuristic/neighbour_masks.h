@@ -14,4 +14,8 @@ namespace feeler::planner {
 void NeighbourMasks(const HypothesisSets& sets, SetId set, const std::array<Cell, 6>& neighbours,
                     std::vector<std::uint8_t>& masks);
 
+/// Members of a window `bits` at `corner` whose neighbour at `by` is a member of the window `others` at `other_corner`.
+Bits256 MembersWithNeighbour(const Bits256& bits, const Cell& corner, const Bits256& others, const Cell& other_corner,
+                             const Cell& by);
+
 }  // namespace feeler::planner

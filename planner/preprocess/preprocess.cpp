@@ -29,6 +29,8 @@ Extents LargestExtents(const ProblemFamily& family) {
     largest.nx = std::max(largest.nx, extents.nx);
     largest.ny = std::max(largest.ny, extents.ny);
     largest.nz = std::max(largest.nz, extents.nz);
+    largest.n_yaw = std::max(largest.n_yaw, extents.n_yaw);
+    largest.n_pitch = std::max(largest.n_pitch, extents.n_pitch);
   }
   return largest;
 }
@@ -104,7 +106,7 @@ class Framework {
     for (std::size_t j = 0; j < k; ++j) {
       if (states_[j].progress == Progress::kFailed) continue;
       int difference = 0;
-      for (int axis = 0; axis < 3; ++axis) difference += std::abs(At(j)[axis] - At(k)[axis]);
+      for (int axis = 0; axis < kAxisKinds; ++axis) difference += std::abs(At(j)[axis] - At(k)[axis]);
       const std::tuple<int, int> key(difference, -At(j).Count());
       if (best == k || key <= best_key) {
         best = j;

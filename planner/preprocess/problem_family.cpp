@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "core/error.h"
+#include "core/orientation_lattice.h"
 #include "core/random.h"
 
 namespace feeler::planner {
@@ -41,105 +43,160 @@ bool ParseRange(std::string_view text, std::pair<int, int>& range) {
          range.first <= range.second;
 }
 
-/// The axes that the parts of a text stand for: x, y and z if there are three, else the uncertain position axes of the
-/// task if there are as many. Empty: neither.
-std::vector<std::size_t> AxesOf(std::size_t parts, const Task* task) {
-  if (parts == 3) return {0, 1, 2};
-  std::vector<std::size_t> axes;
-  if (task == nullptr) return axes;
-  for (const UncertainAxis& axis : task->axes) {
-    if (!axis.angular()) axes.push_back(static_cast<std::size_t>(axis.kind));
-  }
-  return axes.size() == parts ? axes : std::vector<std::size_t>();
+constexpr std::array<AxisKind, kAxisKinds> kAllAxes = {AxisKind::kX, AxisKind::kY, AxisKind::kZ, AxisKind::kYaw,
+                                                       AxisKind::kPitch};
+
+/// The axes that the parts of a text stand for: those given if there are as many, else x, y and z, or all. Empty:
+/// none of these.
+std::vector<AxisKind> AxesFor(std::size_t parts, const std::vector<AxisKind>& axes) {
+  if (parts == axes.size()) return axes;
+  if (parts == 3 || parts == kAxisKinds) return {kAllAxes.begin(), kAllAxes.begin() + static_cast<int>(parts)};
+  return {};
 }
 
-/// "x, y" of a task with these axes.
-std::string AxisNames(const Task& task) {
+using Ranges = std::array<std::pair<int, int>, kAxisKinds>;
+constexpr Ranges kOneEach = {{{1, 1}, {1, 1}, {1, 1}, {1, 1}, {1, 1}}};
+
+/// What to write: "counts" as 7x7x5, or for the axes of a task.
+std::string HowToWrite(const std::string& counts, const std::vector<AxisKind>& axes) {
   std::string names;
-  for (const UncertainAxis& axis : task.axes) {
-    if (!axis.angular()) names += (names.empty() ? "" : ", ") + std::string(ToString(axis.kind));
-  }
-  return names;
+  for (const AxisKind axis : axes) names += (names.empty() ? "" : ", ") + std::string(ToString(axis));
+  const std::string of = names.empty() ? "x, y, z" : names;
+  return fmt::format("write {} for the axes {}, each from 1 to {}", counts, of, kMostPerAxis);
 }
 
-std::string OrForTask(const Task* task) {
-  if (task == nullptr) return "";
-  const std::string names = AxisNames(*task);
-  return names.empty() || names == "x, y, z" ? "" : fmt::format(", or for the axes {} of {} only", names, task->name);
-}
-
-ProblemFamily Enumerate(const std::array<std::pair<int, int>, 3>& ranges, std::string spec) {
+ProblemFamily Enumerate(const Ranges& ranges, std::string spec) {
   ProblemFamily family;
   family.spec = std::move(spec);
-  for (int x = ranges[0].first; x <= ranges[0].second; ++x) {
-    for (int y = ranges[1].first; y <= ranges[1].second; ++y) {
-      for (int z = ranges[2].first; z <= ranges[2].second; ++z) family.problems.push_back({x, y, z});
+  Extents at;
+  for (at.nx = ranges[0].first; at.nx <= ranges[0].second; ++at.nx) {
+    for (at.ny = ranges[1].first; at.ny <= ranges[1].second; ++at.ny) {
+      for (at.nz = ranges[2].first; at.nz <= ranges[2].second; ++at.nz) {
+        for (at.n_yaw = ranges[3].first; at.n_yaw <= ranges[3].second; ++at.n_yaw) {
+          for (at.n_pitch = ranges[4].first; at.n_pitch <= ranges[4].second; ++at.n_pitch)
+            family.problems.push_back(at);
+        }
+      }
     }
   }
   return family;
 }
 
-Extents ParseExtentsFor(std::string_view text, const Task* task) {
-  const std::vector<std::string_view> parts = Split(text, 'x');
-  const std::vector<std::size_t> axes = AxesOf(parts.size(), task);
-  std::array<int, 3> counts = {1, 1, 1};
-  bool good = !axes.empty();
-  for (std::size_t i = 0; good && i < axes.size(); ++i) good = ParseCount(parts[i], counts[axes[i]]);
-  if (!good) {
-    throw InputError(fmt::format("extents '{}'", text), "not three counts",
-                     fmt::format("write them as 7x7x5, each from 1 to {}{}", kMostPerAxis, OrForTask(task)));
-  }
-  return {counts[0], counts[1], counts[2]};
-}
-
-ProblemFamily ParseFamilyFor(std::string_view spec, const Task* task) {
+ProblemFamily ParseFamilyFor(std::string_view spec, const std::vector<AxisKind>& known) {
   const std::vector<std::string_view> parts = Split(spec, 'x');
-  const std::vector<std::size_t> axes = AxesOf(parts.size(), task);
-  std::array<std::pair<int, int>, 3> ranges = {{{1, 1}, {1, 1}, {1, 1}}};
+  const std::vector<AxisKind> axes = AxesFor(parts.size(), known);
+  Ranges ranges = kOneEach;
   bool good = !axes.empty();
-  for (std::size_t i = 0; good && i < axes.size(); ++i) good = ParseRange(parts[i], ranges[axes[i]]);
+  for (std::size_t i = 0; good && i < axes.size(); ++i) {
+    good = ParseRange(parts[i], ranges[static_cast<std::size_t>(axes[i])]);
+  }
   if (!good) {
-    throw InputError(
-        fmt::format("family '{}'", spec), "not three ranges of counts",
-        fmt::format("write it as 2..15x2..15x2..15 or 7x7x5, counts from 1 to {}{}", kMostPerAxis, OrForTask(task)));
+    throw InputError(fmt::format("family '{}'", spec), fmt::format("not {} ranges of counts", known.size()),
+                     HowToWrite("ranges such as 2..15 or counts, joined by x,", known));
   }
   return Enumerate(ranges, std::string(spec));
 }
 
+const std::vector<AxisKind> kPositions = {AxisKind::kX, AxisKind::kY, AxisKind::kZ};
+
+std::string Joined(const std::vector<int>& counts) {
+  std::string text;
+  for (const int count : counts) text += fmt::format("{}{}", text.empty() ? "" : "x", count);
+  return text;
+}
+
 }  // namespace
 
-std::string ToString(const Extents& extents) { return fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz); }
+std::vector<AxisKind> AxesOf(const Task& task) {
+  std::vector<AxisKind> axes;
+  for (const UncertainAxis& axis : task.axes) axes.push_back(axis.kind);
+  return axes;
+}
 
-Extents ParseExtents(std::string_view text) { return ParseExtentsFor(text, nullptr); }
+std::vector<int> CountsAlong(const std::vector<AxisKind>& axes, const Extents& extents) {
+  std::vector<int> counts;
+  for (const AxisKind axis : axes) counts.push_back(extents[axis]);
+  return counts;
+}
 
-Extents ParseExtents(std::string_view text, const Task& task) { return ParseExtentsFor(text, &task); }
+Extents ExtentsAlong(const std::vector<AxisKind>& axes, const std::vector<int>& counts) {
+  std::array<int, kAxisKinds> all = {1, 1, 1, 1, 1};
+  for (std::size_t i = 0; i < axes.size() && i < counts.size(); ++i) {
+    all[static_cast<std::size_t>(axes[i])] = counts[i];
+  }
+  return {all[0], all[1], all[2], all[3], all[4]};
+}
+
+std::string ToString(const Extents& extents) {
+  const std::string positions = fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz);
+  if (extents.n_yaw == 1 && extents.n_pitch == 1) return positions;
+  return fmt::format("{}x{}x{}", positions, extents.n_yaw, extents.n_pitch);
+}
+
+std::string ToString(const Extents& extents, const std::vector<AxisKind>& axes) {
+  const std::vector<int> counts = CountsAlong(axes, extents);
+  return ExtentsAlong(axes, counts) == extents && !axes.empty() ? Joined(counts) : ToString(extents);
+}
+
+std::string ToString(const Extents& extents, const Task& task) { return ToString(extents, AxesOf(task)); }
+
+Extents ParseExtents(std::string_view text) { return ParseExtents(text, kPositions); }
+
+Extents ParseExtents(std::string_view text, const std::vector<AxisKind>& known) {
+  const std::vector<std::string_view> parts = Split(text, 'x');
+  const std::vector<AxisKind> axes = AxesFor(parts.size(), known);
+  std::vector<int> counts(axes.size(), 1);
+  bool good = !axes.empty();
+  for (std::size_t i = 0; good && i < axes.size(); ++i) good = ParseCount(parts[i], counts[i]);
+  if (!good) {
+    throw InputError(fmt::format("extents '{}'", text), fmt::format("not {} counts", known.size()),
+                     HowToWrite(fmt::format("counts such as {}", Joined(std::vector<int>(known.size(), 5))), known));
+  }
+  return ExtentsAlong(axes, counts);
+}
+
+Extents ParseExtents(std::string_view text, const Task& task) { return ParseExtents(text, AxesOf(task)); }
 
 Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> map, const Extents& extents) {
   Problem problem;
-  problem.name = fmt::format("{} {}", task.name, ToString(extents));
+  problem.name = fmt::format("{} {}", task.name, ToString(extents, task));
   problem.map = std::move(map);
   if (!problem.map) throw InputError(problem.name, "no contact map");
-  const int orientations = problem.map->orientations();
-  problem.hypotheses.reserve(static_cast<std::size_t>(extents.Count()) * static_cast<std::size_t>(orientations));
+  const int yaws = LatticeAngles(task, AxisKind::kYaw);
+  const int pitches = LatticeAngles(task, AxisKind::kPitch);
+  if (problem.map->orientations() != yaws * pitches) {
+    throw InputError(problem.name, fmt::format("the contact map has {} orientations, the task {}",
+                                               problem.map->orientations(), yaws * pitches));
+  }
+  if (extents.n_yaw > yaws || extents.n_pitch > pitches) {
+    throw InputError(problem.name, fmt::format("the task has {} yaw and {} pitch angles", yaws, pitches),
+                     "ask for fewer, or raise feeler_max_cells in the task file");
+  }
+  problem.pitches = pitches;
+  const int first_yaw = FirstAngle(extents.n_yaw, yaws);
+  const int first_pitch = FirstAngle(extents.n_pitch, pitches);
+  problem.hypotheses.reserve(static_cast<std::size_t>(extents.Count()));
   for (int x = 0; x < extents.nx; ++x) {
     for (int y = 0; y < extents.ny; ++y) {
       for (int z = 0; z < extents.nz; ++z) {
-        for (int o = 0; o < orientations; ++o) problem.hypotheses.push_back({Cell(x, y, z), o, 1.0});
+        for (int yaw = first_yaw; yaw < first_yaw + extents.n_yaw; ++yaw) {
+          for (int pitch = first_pitch; pitch < first_pitch + extents.n_pitch; ++pitch) {
+            problem.hypotheses.push_back({Cell(x, y, z), yaw * pitches + pitch, 1.0});
+          }
+        }
       }
     }
   }
-  Cell reach;
+  const Cell cuboid(extents.nx, extents.ny, extents.nz);
+  problem.start = StartCell(task, cuboid);
+  problem.workspace = WorkspaceCells(task, cuboid);
   for (int axis = 0; axis < 3; ++axis) {
-    const double centre = (extents[axis] - 1) / 2.0;
-    problem.start[axis] = static_cast<int>(std::floor(centre + task.start_offset_m[axis] / task.cell_m + 1e-9));
-    reach[axis] = static_cast<int>(std::floor(task.workspace_m[axis] / task.cell_m + 1e-9));
     const bool along_insertion = axis == AxisOf(task.insertion);
     const double tolerance_m = along_insertion ? task.tolerance.vertical_m : task.tolerance.lateral_m;
     // The truth lies half a cell around a lattice point, so a spread of k cells needs a motion that forgives (k+1)/2.
     problem.insertable_spread[axis] =
         std::max(0, static_cast<int>(std::floor(2.0 * tolerance_m / task.cell_m - 1.0 + 1e-9)));
   }
-  problem.workspace = {problem.start - reach, problem.start + reach};
   problem.move_lengths = task.move_lengths;
   problem.cost = task.cost;
   problem.goal = task.goal;
@@ -148,9 +205,9 @@ Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> ma
   return problem;
 }
 
-ProblemFamily ParseProblemFamily(std::string_view spec) { return ParseFamilyFor(spec, nullptr); }
+ProblemFamily ParseProblemFamily(std::string_view spec) { return ParseFamilyFor(spec, kPositions); }
 
-ProblemFamily ParseProblemFamily(std::string_view spec, const Task& task) { return ParseFamilyFor(spec, &task); }
+ProblemFamily ParseProblemFamily(std::string_view spec, const Task& task) { return ParseFamilyFor(spec, AxesOf(task)); }
 
 ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string spec) {
   ProblemFamily all;
@@ -164,13 +221,13 @@ ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string sp
 }
 
 ProblemFamily FamilyOf(const Task& task) {
-  std::array<std::pair<int, int>, 3> ranges = {{{1, 1}, {1, 1}, {1, 1}}};
-  for (const UncertainAxis& axis : task.axes) {
-    if (!axis.angular()) ranges[static_cast<std::size_t>(axis.kind)] = {axis.min_cells, axis.max_cells};
-  }
+  Ranges ranges = kOneEach;
   std::string spec;
-  for (const auto& [low, high] : ranges) {
-    spec += (spec.empty() ? "" : "x") + (low == high ? fmt::format("{}", low) : fmt::format("{}..{}", low, high));
+  for (const UncertainAxis& axis : task.axes) {
+    ranges[static_cast<std::size_t>(axis.kind)] = {axis.min_cells, axis.max_cells};
+    spec += spec.empty() ? "" : "x";
+    spec += axis.min_cells == axis.max_cells ? fmt::format("{}", axis.min_cells)
+                                             : fmt::format("{}..{}", axis.min_cells, axis.max_cells);
   }
   return Enumerate(ranges, spec);
 }

@@ -64,6 +64,7 @@ struct SolverOptions {
   bool canonical_translation = true;
   JumpKind jumps = JumpKind::kSameHypotheses;       ///< of E-RTDP-Bel
   const CancellationToken* cancellation = nullptr;  ///< may be null
+  ProgressCallback on_tables;                       ///< while tables over orientations are built; may be empty
   std::function<void(const BoundsRow&)> on_bounds;  ///< the bounds table; may be empty; called from the solving thread
 };
 

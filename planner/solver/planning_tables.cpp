@@ -30,11 +30,21 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
     : map_(problem.map), problem_(problem), options_(options), masks_(*problem.map) {
   options_.cancellation = nullptr;
   options_.on_bounds = nullptr;
+  options_.on_tables = nullptr;
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
   const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths);
   pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
+  const bool oriented = problem.map->orientations() > 1;
+  if (oriented) {
+    const auto flags = std::make_shared<const StepFlagsGrid>(*problem.map, jobs);
+    oriented_pairs_ = std::make_shared<OrientedPairs>(flags, costs);
+    if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
+      oriented_ = std::make_shared<OrientedCertificates>(problem, *flags, costs, jobs, options.on_tables);
+    }
+  }
   switch (options.heuristic) {
     case HeuristicKind::kCertificate:
+      if (oriented_) break;
       if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
         local_certificate_ = std::make_shared<LocalCertificateTable>(problem, motions);
       } else {
@@ -42,6 +52,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
       }
       break;
     case HeuristicKind::kCuboids:
+      if (oriented_) break;  // there are no tables of cuboids over orientations
       certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
       // Cuboids are bounded by single steps, in the middle of moves too: so must be what is left of them.
       cuboids_ = std::make_shared<CuboidTable>(
@@ -57,6 +68,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
                                                                const HypothesisSets& sets) const {
+  if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_);
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
@@ -66,7 +78,8 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& pr
 
 const PlanningTables::Filled& PlanningTables::filled() const {
   std::call_once(filled_once_, [&] {
-    filled_.map = FillDeadEnds(*map_);
+    // Bounds for openings are made for one orientation.
+    if (map_->orientations() == 1) filled_.map = FillDeadEnds(*map_);
     if (!filled_.map) return;
     Problem problem = problem_;
     problem.map = filled_.map;

@@ -11,6 +11,7 @@
 #include "planner/heuristic/lines.h"
 #include "planner/heuristic/local_certificate.h"
 #include "planner/heuristic/open_bound.h"
+#include "planner/heuristic/oriented_heuristic.h"
 #include "planner/heuristic/pair_certificates.h"
 #include "planner/solver/solve.h"
 
@@ -40,6 +41,8 @@ class PlanningTables {
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;
+  std::shared_ptr<const OrientedCertificates> oriented_;  ///< with their pairs, where the target has orientations
+  std::shared_ptr<const OrientedPairs> oriented_pairs_;
   std::shared_ptr<const CuboidTable> cuboids_;
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;

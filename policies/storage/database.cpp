@@ -95,22 +95,27 @@ void CheckLength(const SqliteConnection& connection, const std::string& path) {
   }
 }
 
-/// The fields of the SQLite header that make the file ours; then its length. To be called in a transaction.
-void CheckHeader(const SqliteConnection& connection, const std::string& path) {
+/// The fields of the SQLite header that make the file ours; then its length. Returns the version. To be called in a
+/// transaction.
+int CheckHeader(const SqliteConnection& connection, const std::string& path) {
   const auto header = connection.ReadHeader();
   if (BigEndian(header, 68, 4) != Database::kApplicationId) {
     throw InputError(path, "is an SQLite database of another application", kMakeOne);
   }
   const std::uint32_t version = BigEndian(header, 60, 4);
-  if (version != Database::kVersion) {  // older versions will be read by their own schema here
+  if (version < 1 || version > Database::kVersion) {
     throw InputError(
-        path, fmt::format("is a database of version {}, this feeler reads version {}", version, Database::kVersion),
+        path,
+        fmt::format("is a database of version {}, this feeler reads versions 1 to {}", version, Database::kVersion),
         "use the version of feeler that wrote it");
   }
   CheckLength(connection, path);
+  return static_cast<int>(version);
 }
 
-void CheckSchema(const SqliteConnection& connection, const std::string& path) {
+const std::array<TableSchema, 3>& SchemaOf(int version) { return version == 1 ? kSchemaVersion1 : kSchemaVersion2; }
+
+void CheckSchema(const SqliteConnection& connection, int version, const std::string& path) {
   std::map<std::string, std::string> tables;
   SqliteStatement statement(connection, "SELECT type, name, sql FROM sqlite_schema");
   while (statement.Step()) {
@@ -118,7 +123,7 @@ void CheckSchema(const SqliteConnection& connection, const std::string& path) {
     if (type == "trigger") throw Damaged(path, "it contains a trigger");
     if (type == "table") tables[statement.Text(1)] = statement.Text(2);
   }
-  for (const TableSchema& table : kSchemaVersion1) {
+  for (const TableSchema& table : SchemaOf(version)) {
     const auto found = tables.find(table.name);
     if (found == tables.end() || found->second != table.sql) {
       throw Damaged(path, fmt::format("table {} is missing or altered", table.name));
@@ -131,6 +136,7 @@ void CheckSchema(const SqliteConnection& connection, const std::string& path) {
 
 using Meta = std::map<std::string, std::string>;
 constexpr const char* kMetaChecksum = "checksum";
+constexpr const char* kMetaAxes = "axes";         // since version 2
 constexpr const char* kMetaCount = "problems";    // rows of the table problems
 constexpr const char* kMetaSum = "problems_sum";  // of their checksums, modulo 2^64: a lost row shows
 
@@ -160,6 +166,26 @@ void WriteMeta(const SqliteConnection& connection, const Meta& meta) {
   }
 }
 
+std::string AxesText(const std::vector<AxisKind>& axes) {
+  std::string text;
+  for (const AxisKind axis : axes) text += (text.empty() ? "" : ",") + std::string(ToString(axis));
+  return text;
+}
+
+std::vector<AxisKind> ParseAxes(const std::string& text, const std::string& path) {
+  std::vector<AxisKind> axes;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(',', at), text.size());
+    const std::string word = text.substr(at, end - at);
+    int kind = 0;
+    while (kind < planner::kAxisKinds && ToString(static_cast<AxisKind>(kind)) != word) ++kind;
+    if (kind == planner::kAxisKinds) throw Damaged(path, "table meta names an unknown axis");
+    axes.push_back(static_cast<AxisKind>(kind));
+    at = end + 1;
+  }
+  return axes;
+}
+
 json CostJson(const CostWeights& cost) {
   return {{"per_cell", cost.per_cell}, {"per_contact", cost.per_contact}, {"per_action", cost.per_action}};
 }
@@ -179,13 +205,16 @@ Meta ToMeta(const DatabaseIdentity& identity) {
 DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
   try {
     const json cost = json::parse(meta.at("cost"));
-    return {meta.at("task"),
-            meta.at("fingerprint"),
-            meta.at("opening"),
-            meta.at("goal"),
-            {cost.at("per_cell"), cost.at("per_contact"), cost.at("per_action")},
-            meta.at("settings"),
-            meta.at("created_by")};
+    DatabaseIdentity identity{meta.at("task"),
+                              meta.at("fingerprint"),
+                              meta.at("opening"),
+                              meta.at("goal"),
+                              {cost.at("per_cell"), cost.at("per_contact"), cost.at("per_action")},
+                              meta.at("settings"),
+                              meta.at("created_by")};
+    const auto axes = meta.find(kMetaAxes);
+    if (axes != meta.end()) identity.axes = ParseAxes(axes->second, path);
+    return identity;
   } catch (const std::exception&) {  // a key is missing or is not JSON
     throw Damaged(path, "table meta lacks an entry");
   }
@@ -209,12 +238,27 @@ void RequireSameIdentity(const Meta& stored, const DatabaseIdentity& identity, c
 
 // --- rows ------------------------------------------------------------------------------------------------------------
 
-constexpr const char* kSelect =
-    "SELECT problems.extents, nx, ny, nz, status, solver, epsilon, expected_cost, lower_bound, expansions, seed, "
-    "version, problems.checksum, policy, cpu_s, wall_s, timings.checksum FROM problems LEFT JOIN timings ON "
-    "timings.extents = problems.extents ";
-const std::string kSelectOne = std::string(kSelect) + "WHERE problems.extents = ?";
-const std::string kSelectAll = std::string(kSelect) + "ORDER BY nx, ny, nz";
+/// Angle counts are 1 in files of version 1.
+std::string Select(int version, const char* tail) {
+  return fmt::format(
+      "SELECT problems.extents, nx, ny, nz, status, solver, epsilon, expected_cost, lower_bound, expansions, seed, "
+      "version, problems.checksum, policy, cpu_s, wall_s, timings.checksum, {} FROM problems LEFT JOIN timings ON "
+      "timings.extents = problems.extents {}",
+      version == 1 ? "1, 1" : "n_yaw, n_pitch", tail);
+}
+std::string SelectOne(int version) { return Select(version, "WHERE problems.extents = ?"); }
+std::string SelectAll(int version) {
+  return Select(version, version == 1 ? "ORDER BY nx, ny, nz" : "ORDER BY nx, ny, nz, n_yaw, n_pitch");
+}
+/// Parameters 1 to 14 as in version 1, then the angles.
+std::string InsertOrUpdate(int version) {
+  return fmt::format(
+      "INSERT INTO problems (extents, nx, ny, nz, status, solver, epsilon, expected_cost, lower_bound, expansions, "
+      "seed, version, checksum, policy{}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14{}) ON "
+      "CONFLICT (extents) DO UPDATE SET status = ?5, solver = ?6, epsilon = ?7, expected_cost = ?8, lower_bound = ?9, "
+      "expansions = ?10, seed = ?11, version = ?12, checksum = ?13, policy = ?14",
+      version == 1 ? "" : ", n_yaw, n_pitch", version == 1 ? "" : ", ?15, ?16");
+}
 
 struct CheckedRow {
   ProblemRow row;
@@ -229,7 +273,7 @@ CheckedRow ReadRow(const SqliteStatement& statement, const std::string& path) {
   const auto extent = [&](int column) {
     return static_cast<int>(std::clamp<std::int64_t>(statement.Integer(column), 0, 1 << 20));
   };
-  problem.extents = {extent(1), extent(2), extent(3)};
+  problem.extents = {extent(1), extent(2), extent(3), extent(17), extent(18)};
   problem.status = statement.Text(4);
   problem.solver = statement.Text(5);
   problem.epsilon = statement.Real(6);
@@ -263,7 +307,8 @@ struct Database::State {
   std::unique_ptr<WriterLock> lock;  // before the connection: see WriterLock
   std::unique_ptr<SqliteConnection> connection;
   std::unique_ptr<SqliteStatement> select_one;
-  Meta meta;  // the writer's, as committed
+  int version = kVersion;  // of the file
+  Meta meta;               // the writer's, as committed
   DatabaseIdentity identity;
   std::string verified_checksum;  // meta checksum at the last Verify: a miss is a true one while it stands
   std::mutex mutex;
@@ -281,8 +326,9 @@ struct Database::State {
     SqliteTransaction transaction(*connection, SqliteTransaction::Kind::kWrite);
     connection->Execute(
         fmt::format("PRAGMA application_id={}; PRAGMA user_version={}", kApplicationId, kVersion).c_str());
-    for (const TableSchema& table : kSchemaVersion1) connection->Execute(table.sql);
+    for (const TableSchema& table : SchemaOf(version)) connection->Execute(table.sql);
     meta = ToMeta(wanted);
+    meta[kMetaAxes] = AxesText(wanted.axes);
     meta[kMetaCount] = "0";
     meta[kMetaSum] = fmt::format("{:016x}", 0);
     meta[kMetaChecksum] = MetaChecksum(meta);
@@ -297,8 +343,8 @@ struct Database::State {
     // The first read undoes what a killed writer left behind; only then are header and tables what was committed.
     const std::int64_t objects = connection->QueryInteger("SELECT count(*) FROM sqlite_schema");
     if (objects == 0 && FileSize(path) == 0) throw InputError(path, "is empty", kMakeOne);
-    CheckHeader(*connection, path);
-    CheckSchema(*connection, path);
+    version = CheckHeader(*connection, path);
+    CheckSchema(*connection, version, path);
     meta = ReadMeta(*connection, path);
     identity = FromMeta(meta, path);
   }
@@ -307,7 +353,7 @@ struct Database::State {
   void ForEachRow(const std::function<void(const ProblemRow&)>& visit) {
     SqliteTransaction transaction(*connection, SqliteTransaction::Kind::kRead);
     const Meta present = ReadMeta(*connection, path);
-    SqliteStatement statement(*connection, kSelectAll.c_str());
+    SqliteStatement statement(*connection, SelectAll(version).c_str());
     std::uint64_t sum = 0;
     std::int64_t count = 0;
     std::optional<planner::Extents> previous;
@@ -331,8 +377,7 @@ struct Database::State {
       SqliteTransaction transaction(*connection, SqliteTransaction::Kind::kRead);
       SqliteStatement check(*connection, "PRAGMA integrity_check(1)");
       if (!check.Step() || check.Text(0) != "ok") throw Damaged(path, "its pages contradict each other");
-      CheckHeader(*connection, path);
-      CheckSchema(*connection, path);
+      CheckSchema(*connection, CheckHeader(*connection, path), path);
       checksum = ReadMeta(*connection, path).at(kMetaChecksum);
       if (connection->QueryInteger("SELECT count(*) FROM timings") !=
           connection->QueryInteger("SELECT count(*) FROM problems")) {
@@ -344,7 +389,7 @@ struct Database::State {
   }
 
   std::optional<StoredProblem> Find(const planner::Extents& extents) {
-    if (!select_one) select_one = std::make_unique<SqliteStatement>(*connection, kSelectOne.c_str());
+    if (!select_one) select_one = std::make_unique<SqliteStatement>(*connection, SelectOne(version).c_str());
     const std::string key = ExtentsKey(extents);
     {
       const SqliteReset reset(*select_one);
@@ -434,6 +479,9 @@ void Database::Put(const StoredProblem& problem) {
   State& state = *state_;
   state.RequireWriter();
   const ProblemRow row = ToRow(problem);
+  if (state.version == 1 && (problem.extents.n_yaw > 1 || problem.extents.n_pitch > 1)) {
+    throw std::invalid_argument("Database::Put: a file of version 1 holds no angles");
+  }
   const std::string key = ExtentsKey(problem.extents);
   const std::uint64_t checksum = RowChecksum(row);
   const double cpu_s = problem.cpu_s + 0.0;  // SQLite does not keep the sign of zero
@@ -452,17 +500,15 @@ void Database::Put(const StoredProblem& problem) {
         ++count;
       }
     }
-    SqliteStatement insert(*state.connection,
-                           "INSERT INTO problems (extents, nx, ny, nz, status, solver, epsilon, expected_cost, "
-                           "lower_bound, expansions, seed, version, checksum, policy) VALUES "
-                           "(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14) ON CONFLICT (extents) DO "
-                           "UPDATE SET status = ?5, solver = ?6, epsilon = ?7, expected_cost = ?8, lower_bound = ?9, "
-                           "expansions = ?10, seed = ?11, version = ?12, checksum = ?13, policy = ?14");
+    SqliteStatement insert(*state.connection, InsertOrUpdate(state.version).c_str());
     const StoredProblem& stored = row.problem;
     insert.Bind(1, std::string_view(key));
     insert.Bind(2, std::int64_t{stored.extents.nx});
     insert.Bind(3, std::int64_t{stored.extents.ny});
     insert.Bind(4, std::int64_t{stored.extents.nz});
+    if (state.version > 1) {
+      insert.Bind(15, std::int64_t{stored.extents.n_yaw}).Bind(16, std::int64_t{stored.extents.n_pitch});
+    }
     insert.Bind(5, std::string_view(stored.status)).Bind(6, std::string_view(stored.solver));
     insert.Bind(7, stored.epsilon);
     if (row.blob.empty()) {

@@ -25,6 +25,9 @@ struct DatabaseIdentity {
   CostWeights cost;             ///< of a guarded move
   std::string settings = "{}";  ///< of the solver, a JSON object
   std::string created_by;       ///< version of feeler that made the file
+  /// The uncertain axes of the task, in its order (files of version 1: x, y, z). For reading and printing extents; what
+  /// the database is made for is said by the fingerprint.
+  std::vector<AxisKind> axes = {AxisKind::kX, AxisKind::kY, AxisKind::kZ};
 };
 
 /// One problem of the family and what became of it.
@@ -78,7 +81,7 @@ struct DatabaseInfo {
 class Database {
  public:
   static constexpr std::uint32_t kApplicationId = 0x4645454C;  ///< "FEEL"
-  static constexpr int kVersion = 1;                           ///< user_version of files written
+  static constexpr int kVersion = 2;                           ///< user_version of files made; 1 is continued as it is
 
   /// A new file; an existing one must be empty. Killed half-way it leaves an empty file, which counts as absent.
   static Database Create(const std::string& path, const DatabaseIdentity& identity);

@@ -1,7 +1,5 @@
 #include "policies/storage/row.h"
 
-#include <fmt/format.h>
-
 #include <bit>
 #include <cmath>
 #include <stdexcept>
@@ -23,9 +21,7 @@ double StoredProblem::Ratio() const {
   return expected_cost == lower_bound ? 1.0 : std::numeric_limits<double>::infinity();
 }
 
-std::string ExtentsKey(const planner::Extents& extents) {
-  return fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz);
-}
+std::string ExtentsKey(const planner::Extents& extents) { return planner::ToString(extents); }
 
 std::string RowBytes(const ProblemRow& row) {
   const StoredProblem& p = row.problem;
@@ -57,7 +53,7 @@ ProblemRow ToRow(const StoredProblem& problem) {
   const auto require = [&](bool condition, const char* what) {
     if (!condition) throw std::invalid_argument("problem " + ExtentsKey(problem.extents) + ": " + what);
   };
-  require(problem.extents.nx >= 1 && problem.extents.ny >= 1 && problem.extents.nz >= 1, "extents below 1");
+  for (int axis = 0; axis < planner::kAxisKinds; ++axis) require(problem.extents[axis] >= 1, "extents below 1");
   require(!std::isnan(problem.epsilon), "epsilon is not a number");
   require(problem.lower_bound >= 0.0 && std::isfinite(problem.lower_bound), "lower bound negative or not finite");
   require(std::isfinite(problem.cpu_s) && std::isfinite(problem.wall_s), "times are not finite");

@@ -13,7 +13,7 @@ struct ProblemRow {
   std::string blob;
 };
 
-/// "7x7x5".
+/// "7x7x5", "10x10x1x6x6" where there are angles.
 std::string ExtentsKey(const planner::Extents& extents);
 
 /// The bytes a row's checksum and the content digest are taken over: every column but the row number.

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/parallelism.h"
+#include "planner/contact/active_region.h"
+#include "planner/contact/contact_map.h"
+
+namespace feeler::planner {
+
+/// StepFlags of every displacement, a byte each and a grid per orientation, for tables over many orientations. The grid
+/// is the domain of the map and one cell beyond it, where everything repeats. Immutable.
+class StepFlagsGrid {
+ public:
+  StepFlagsGrid(const ContactMap& map, Parallelism jobs);
+
+  int orientations() const { return static_cast<int>(flags_.size()); }
+  std::uint8_t At(const Cell& displacement, int orientation) const {
+    const Cell c = domain_.Clamp(displacement) - domain_.min;
+    return flags_[static_cast<std::size_t>(orientation)]
+                 [static_cast<std::size_t>((std::int64_t{c.z()} * size_.y() + c.y()) * size_.x() + c.x())];
+  }
+
+  struct Region {
+    CellBox box;  ///< beyond it the flags repeat those of its outermost layers
+    /// Per axis: nothing is in the way in the outermost layer, nor beyond it.
+    std::array<bool, 3> free_above{};
+    std::array<bool, 3> free_below{};
+  };
+  /// Where something happens under an orientation.
+  const Region& region(int orientation) const { return regions_[static_cast<std::size_t>(orientation)]; }
+  /// Where something happens under either of two.
+  static Region Union(const Region& a, const Region& b);
+
+ private:
+  Region Active(int orientation) const;
+  template <class F>
+  bool AllOfLayer(CellBox box, int axis, int at, F holds) const;
+
+  CellBox domain_;
+  Cell size_;
+  std::vector<std::vector<std::uint8_t>> flags_;
+  std::vector<Region> regions_;
+};
+
+}  // namespace feeler::planner

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "planner/contact/step_flags_grid.h"
+#include "planner/heuristic/oriented_certificates.h"
+
+namespace feeler::planner {
+
+/// For two hypotheses, (h, o) and (h + offset, other): the least cost of a walk, as the tool fares under the first,
+/// that tells them apart; in the bytes of OrientedCertificates. A table per pair, built when first asked for; safe to
+/// use from many threads.
+class OrientedPairs {
+ public:
+  struct Plane {
+    OrientedBox box;
+    std::vector<std::uint8_t> values;
+  };
+
+  OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs);
+
+  const Plane& Get(const Cell& offset, int orientation, int other) const;
+
+ private:
+  Plane Build(const Cell& offset, int orientation, int other) const;
+
+  std::shared_ptr<const StepFlagsGrid> flags_;
+  std::uint8_t contact_units_ = 0;
+  mutable std::mutex mutex_;
+  mutable std::map<std::array<int, 5>, std::unique_ptr<const Plane>> planes_;
+};
+
+}  // namespace feeler::planner
