@@ -14,4 +14,14 @@ std::string_view ToString(StopReason reason) {
   return "";
 }
 
+CameraView Robot::Look() { return {}; }
+
+MotionResult Robot::FollowTwist(const TwistMotion& /*motion*/) {
+  MotionResult result;
+  result.reason = StopReason::kUnplanned;
+  result.world_T_tool = ToolPose();
+  result.detail = "this robot does not follow a twist";
+  return result;
+}
+
 }  // namespace feeler

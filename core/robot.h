@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,27 @@ struct CompliantMotion {
   double rotational_stiffness_nm_rad = 200.0;
 };
 
+/// A motion with a given velocity, for a time: of a frame that is fixed to the tool (that of the camera), in its own
+/// axes. The velocity before it goes over into this one as fast as the robot can.
+struct TwistMotion {
+  Pose tool_T_frame = Pose::Identity();
+  Eigen::Vector3d linear_m_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_rad_s = Eigen::Vector3d::Zero();
+  double duration_s = 0.0;
+  double contact_force_n = 5.0;  ///< a net contact force above this ends it
+};
+
+/// What a calibrated camera on the robot sees, and how it sees it.
+struct CameraView {
+  int width = 0;  ///< 0: the robot has no camera
+  int height = 0;
+  std::vector<std::uint8_t> rgb;  ///< rows from the top
+  /// Pinhole: u = fx x / z + cx, v = fy y / z + cy with x to the right, y down, z forward from the camera; whole
+  /// numbers are centres of pixels.
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
+  Pose tool_T_camera = Pose::Identity();
+};
+
 struct MotionResult {
   StopReason reason = StopReason::kReached;
   double travelled_m = 0.0;  ///< along the commanded direction or path, measured
@@ -66,6 +88,12 @@ class Robot {
   virtual MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) = 0;
   virtual MotionResult GuardedMove(const GuardedMotion& motion) = 0;
   virtual MotionResult Compliant(const CompliantMotion& motion) = 0;
+
+  // Robots with an eye on the wrist. Without one: an empty view, and no motion (kUnplanned).
+  virtual CameraView Look();
+  /// Within the limits of the joints: where they do not allow the speed, slower. The robot goes on with the velocity
+  /// that it has when this returns only if the next call follows a twist, too; any other call finds it stopping.
+  virtual MotionResult FollowTwist(const TwistMotion& motion);
 };
 
 }  // namespace feeler

@@ -47,6 +47,7 @@ class Pruner {
       pruned = true;
     }
     if (pruned && id > 0 && full_.body_mass[id] > 0) KeepInertia(id, body);
+    for (XMLElement* camera : Children(body, "camera")) body.DeleteChild(camera);
     for (XMLElement* child : Children(body, "body")) {
       if (!Prune(*child)) return false;
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "core/error.h"
 #include "env/egl_context.h"
@@ -86,7 +87,7 @@ class Renderer::Context {
 
   // Renders with the context current and hands the drawing to `read`.
   template <typename Read>
-  void Render(mjData& data, const Camera& camera, bool for_depth, const Read& read) {
+  void Render(mjData& data, const Camera& camera, bool for_depth, const Read& read, bool numbers = false) {
     mjvCamera view = ToMujoco(model_, camera);
     const EglContext::Scope current(egl_);
     std::unique_ptr<Drawing>& drawing = for_depth ? depth_ : color_;
@@ -97,6 +98,8 @@ class Renderer::Context {
     mjv_updateScene(&model_, &data, &shown, nullptr, &view, mjCAT_ALL, &drawing->scene());
     drawing->scene().flags[mjRND_SHADOW] = options_.shadows && !for_depth ? 1 : 0;
     drawing->scene().flags[mjRND_REFLECTION] = for_depth ? 0 : 1;
+    drawing->scene().flags[mjRND_SEGMENT] = numbers ? 1 : 0;
+    drawing->scene().flags[mjRND_IDCOLOR] = numbers ? 1 : 0;
     mjr_render({0, 0, options_.width, options_.height}, &drawing->scene(), &drawing->context());
     read(*drawing);
   }
@@ -138,26 +141,70 @@ Image Renderer::Color(mjData& data, const Camera& camera) {
   return image;
 }
 
-DepthImage Renderer::Depth(mjData& data, const Camera& camera) {
-  DepthImage image{options_.width, options_.height, {}};
-  const auto columns = static_cast<std::size_t>(image.width);
-  std::vector<float> buffer(columns * static_cast<std::size_t>(image.height));
-  double near = 0.0;
-  double far = 0.0;
-  context_->Render(data, camera, true, [&](Drawing& drawing) {
-    mjr_readPixels(nullptr, buffer.data(), {0, 0, image.width, image.height}, &drawing.context());
-    near = drawing.scene().camera[0].frustum_near;
-    far = drawing.scene().camera[0].frustum_far;
-  });
+namespace {
+
+// OpenGL's depth, rows from the bottom, to metres, rows from the top.
+DepthImage MetricDepth(const std::vector<float>& buffer, int width, int height, double near, double far) {
+  DepthImage image{width, height, {}};
   image.depth_m.resize(buffer.size());
-  for (std::size_t row = 0; row < static_cast<std::size_t>(image.height); ++row) {
-    const float* from = buffer.data() + columns * (static_cast<std::size_t>(image.height) - 1 - row);
+  const auto columns = static_cast<std::size_t>(width);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row) {
+    const float* from = buffer.data() + columns * (static_cast<std::size_t>(height) - 1 - row);
     for (std::size_t column = 0; column < columns; ++column) {
       const double value = from[column];
       image.depth_m[row * columns + column] = static_cast<float>(near * far / (far - value * (far - near)));
     }
   }
   return image;
+}
+
+}  // namespace
+
+DepthImage Renderer::Depth(mjData& data, const Camera& camera) {
+  std::vector<float> buffer(static_cast<std::size_t>(options_.width) * static_cast<std::size_t>(options_.height));
+  double near = 0.0;
+  double far = 0.0;
+  context_->Render(data, camera, true, [&](Drawing& drawing) {
+    mjr_readPixels(nullptr, buffer.data(), {0, 0, options_.width, options_.height}, &drawing.context());
+    near = drawing.scene().camera[0].frustum_near;
+    far = drawing.scene().camera[0].frustum_far;
+  });
+  return MetricDepth(buffer, options_.width, options_.height, near, far);
+}
+
+SurfaceImage Renderer::Surface(mjData& data, const Camera& camera) {
+  const auto columns = static_cast<std::size_t>(options_.width);
+  const auto rows = static_cast<std::size_t>(options_.height);
+  std::vector<float> buffer(columns * rows);
+  std::vector<std::uint8_t> colors(3 * columns * rows);
+  std::vector<int> geom_of_segment;
+  double near = 0.0;
+  double far = 0.0;
+  const auto read = [&](Drawing& drawing) {
+    const mjvScene& scene = drawing.scene();
+    mjr_readPixels(colors.data(), buffer.data(), {0, 0, options_.width, options_.height}, &drawing.context());
+    near = scene.camera[0].frustum_near;
+    far = scene.camera[0].frustum_far;
+    geom_of_segment.assign(static_cast<std::size_t>(scene.ngeom), -1);
+    for (int i = 0; i < scene.ngeom; ++i) {
+      const mjvGeom& geom = scene.geoms[i];
+      if (geom.segid >= 0 && geom.segid < scene.ngeom && geom.objtype == mjOBJ_GEOM) {
+        geom_of_segment[static_cast<std::size_t>(geom.segid)] = geom.objid;
+      }
+    }
+  };
+  context_->Render(data, camera, true, read, true);
+  SurfaceImage surface{MetricDepth(buffer, options_.width, options_.height, near, far), {}};
+  surface.geom.resize(columns * rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column) {
+      const std::uint8_t* rgb = colors.data() + 3 * (columns * (rows - 1 - row) + column);
+      const int segment = rgb[0] + 256 * rgb[1] + 65536 * rgb[2] - 1;  // black: nothing
+      const bool known = segment >= 0 && segment < static_cast<int>(geom_of_segment.size());
+      surface.geom[row * columns + column] = known ? geom_of_segment[static_cast<std::size_t>(segment)] : -1;
+    }
+  }
+  return surface;
 }
 
 CameraModel Renderer::Model(mjData& data, const Camera& camera) {
@@ -184,6 +231,21 @@ CameraModel Renderer::Model(mjData& data, const Camera& camera) {
     result.fy = 0.5 * result.height * static_cast<double>(eyes[0].frustum_near) / half_height;
     result.fx = result.fy;
   });
+  return result;
+}
+
+CameraModel CameraModelOf(const mjModel& model, const mjData& data, int camera, int width, int height) {
+  CameraModel result;
+  result.width = width;
+  result.height = height;
+  result.cx = 0.5 * (width - 1);
+  result.cy = 0.5 * (height - 1);
+  const double half_angle = 0.5 * model.cam_fovy[camera] * std::numbers::pi / 180.0;
+  result.fx = result.fy = 0.5 * height / std::tan(half_angle);
+  result.world_T_camera.translation() = Eigen::Map<const Eigen::Vector3d>(data.cam_xpos + 3 * camera);
+  Eigen::Matrix3d axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data.cam_xmat + 9 * camera);
+  axes.rightCols<2>() *= -1.0;  // MuJoCo's cameras look along -z with y upwards
+  result.world_T_camera.linear() = axes;
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "core/pose.h"
 #include "env/image.h"
@@ -40,6 +41,12 @@ struct CameraModel {
   Pose world_T_camera = Pose::Identity();  ///< x right, y down, z forward
 };
 
+/// Depth, and the number of the geom that is seen at each pixel, rows from the top.
+struct SurfaceImage {
+  DepthImage depth;
+  std::vector<int> geom;
+};
+
 struct RendererOptions {
   int width = 1280;
   int height = 720;
@@ -63,6 +70,8 @@ class Renderer {
   Image Color(mjData& data, const Camera& camera);
   /// Metres along the optical axis; beyond the far plane: the far plane. Rendered without multi-sampling.
   DepthImage Depth(mjData& data, const Camera& camera);
+  /// What each pixel shows: the depth, and the geom of the model, -1 where there is none.
+  SurfaceImage Surface(mjData& data, const Camera& camera);
   /// Projection and pose that Color and Depth have for this camera.
   CameraModel Model(mjData& data, const Camera& camera);
 
@@ -74,6 +83,10 @@ class Renderer {
   RendererOptions options_;
   std::unique_ptr<Context> context_;
 };
+
+/// The same for a camera of the model without rendering, in double precision. Kinematics and cameras in `data` must be
+/// up to date (mj_camlight).
+CameraModel CameraModelOf(const mjModel& model, const mjData& data, int camera, int width, int height);
 
 /// Views that suit any task: the whole arm over its target, and tool and target from near.
 FreeCamera OverviewCamera(const Scene& scene);

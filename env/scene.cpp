@@ -199,7 +199,8 @@ void Index(const std::vector<RobotJoint>& joints, const char* root_body, Scene& 
       list = &scene.robot_geoms;
     }
     scene.geom_part.push_back(part);
-    if (part == ScenePart::kTarget && IsLid(model, geom)) list = &scene.lid_geoms;
+    const bool of_task = part == ScenePart::kTarget || part == ScenePart::kTool;
+    if (of_task && IsLid(model, geom)) list = &scene.lid_geoms;
     if (Collides(model, geom) || list == &scene.lid_geoms) list->push_back(geom);
   }
 }
@@ -240,6 +241,7 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   SetPoseAttributes(task.world_T_target, *doc.target);
   doc.target->SetAttribute("mocap", "true");
   DisarmLids(*doc.target);
+  DisarmLids(*doc.tool);
 
   UrdfToMjcfOptions robot_options;
   robot_options.armature_kg_m2 = options.armature_kg_m2;
@@ -260,6 +262,8 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   site.SetAttribute("quat", "1 0 0 0");
   site.SetAttribute("size", 0.001);
   site.SetAttribute("group", 5);
+
+  AddCameras(options.cameras, gripper, task.flange_T_tool, Scene::kVisualGroup, *doc.mujoco, *flange);
 
   AddSettings(options, *doc.mujoco);
   AddDecor(options.workbench, *doc.mujoco);

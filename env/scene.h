@@ -12,6 +12,7 @@
 #include "core/task.h"
 #include "env/kinematics/ur10e.h"
 #include "env/mujoco_handles.h"
+#include "env/scene_cameras.h"
 #include "env/task_file.h"
 
 namespace feeler::env {
@@ -30,6 +31,7 @@ struct SceneOptions {
   bool workbench = true;          ///< a bench under robot and fixtures and a floor, unless the task file has its own
   int max_constraints = 200;      ///< njmax; mjData grows with its square (0.9 MB at 200)
   int max_contacts = 100;         ///< nconmax
+  SceneCameras cameras;           ///< seen and seeing, never felt
 };
 
 /// A range of values; a draw is uniform in it.
@@ -55,7 +57,7 @@ inline constexpr std::array<double, kJointCount> kRealisticJointFriction = {3.0,
 ///
 /// Immutable and shared: copy the struct freely, use one mjData per thread. Actuator i is a motor on joint i with gear
 /// one and the torque limit of the joint as control range: ctrl is a torque in Nm.
-/// `lid*` geoms of the target are kept (contype = conaffinity = 0, group kLidGroup, not drawn) and collide with
+/// `lid*` geoms of target and tool are kept (contype = conaffinity = 0, group kLidGroup, not drawn) and collide with
 /// nothing.
 struct Scene {
   static constexpr int kVisualGroup = 2;     ///< robot geoms that are only drawn

@@ -40,7 +40,8 @@ struct SimulatedRobot::Watch {
 
 SimulatedRobot::SimulatedRobot(std::shared_ptr<const Scene> scene, const RobotOptions& options)
     : options_(options),
-      world_(std::move(scene)),
+      scene_(std::move(scene)),
+      world_(scene_),
       sensor_(world_.scene(), noise_, RandomStream(0, 0, "sensor")),
       friction_(options.friction_observer) {
   Reset(world_.scene().home_q_rad, world_.scene().task.world_T_target, {}, RandomStream(0, 0, "sensor"));
@@ -60,7 +61,10 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
     encoder_offset_[i] = noise.encoder_noise_rad > 0 ? noise.encoder_noise_rad * random.Normal() : 0.0;
   }
   sensor_ = ContactSensor(world_.scene(), noise, random);
-  encoder_random_ = RandomStream(random.Next(), 0, "encoder");
+  const std::uint64_t sensor_seed = random.Next();
+  encoder_random_ = RandomStream(sensor_seed, 0, "encoder");
+  image_random_ = RandomStream(sensor_seed, 0, "image");
+  twist_reference_.reset();
   deflection_.setZero();
   Sense();
   friction_.Reset();
@@ -86,9 +90,9 @@ void SimulatedRobot::SetObserver(std::function<void(const World&)> observer, dou
 }
 
 RobotState SimulatedRobot::Save() const {
-  return {world_.Save(),  noise_,           sensor_,         friction_,   statistics_, target_candidates_,
-          transfer_seed_, encoder_random_,  encoder_offset_, deflection_, measured_q_, held_orientation_,
-          set_point_,     tool_at_sensing_, peak_force_n_,   deadline_s_};
+  return {world_.Save(),  noise_,           sensor_,         friction_,   statistics_,   target_candidates_,
+          transfer_seed_, encoder_random_,  encoder_offset_, deflection_, measured_q_,   held_orientation_,
+          set_point_,     tool_at_sensing_, peak_force_n_,   deadline_s_, image_random_, twist_reference_};
 }
 
 void SimulatedRobot::Restore(const RobotState& s) {
@@ -109,6 +113,8 @@ void SimulatedRobot::Restore(const RobotState& s) {
   tool_at_sensing_ = s.tool_at_sensing;
   peak_force_n_ = s.peak_force_n;
   deadline_s_ = s.deadline_s;
+  image_random_ = s.image_random;
+  twist_reference_ = s.twist_reference;
   next_observation_s_ = world_.time_s();
 }
 
@@ -139,6 +145,12 @@ void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
   ++statistics_.steps;
   statistics_.path_length_m += (before.translation() - tool_at_sensing_.translation()).norm();
   statistics_.peak_force_n = std::max(statistics_.peak_force_n, sensor_.exact().force_n.norm());
+  statistics_.impulse_ns += sensor_.exact().force_n.norm() * world_.timestep_s();
+  const bool forbidden = sensor_.PairFlag(ContactPair::kToolEnvironment) ||
+                         sensor_.PairFlag(ContactPair::kRobotTarget) ||
+                         sensor_.PairFlag(ContactPair::kRobotEnvironment) || sensor_.PairFlag(ContactPair::kRobotRobot);
+  if (forbidden && !statistics_.forbidden_now) ++statistics_.forbidden_contacts;
+  statistics_.forbidden_now = forbidden;
   peak_force_n_ = std::max(peak_force_n_, sensor_.raw().force_n.norm());
   tool_at_sensing_ = before;
   if (observer_ && world_.time_s() >= next_observation_s_ - 1e-9) {
@@ -460,6 +472,112 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
                              ? (result.world_T_tool.translation() - start.translation()).dot(way.normalized())
                              : statistics_.path_length_m - path_before_m;
     if (result.reason == StopReason::kForceLimit || result.reason == StopReason::kAborted) Hold(result);
+    return result;
+  });
+}
+
+CameraView SimulatedRobot::Look() {
+  if (!wrist_camera_) wrist_camera_ = std::make_unique<WristCamera>(scene_, options_.wrist_camera);
+  return wrist_camera_->Look(world_.data(), &image_random_);
+}
+
+std::optional<JointReference> SimulatedRobot::Advance(const Vector6& wanted, TwistReference& reference,
+                                                      JointVector& q) const {
+  const double dt = world_.timestep_s();
+  // The velocity changes as fast as the robot's acceleration allows, linear and angular each along a straight line.
+  const auto approach = [&](Eigen::Index part, double acceleration) {
+    const Eigen::Vector3d change = wanted.segment<3>(part) - reference.twist.segment<3>(part);
+    const double most = acceleration * dt;
+    reference.twist.segment<3>(part) +=
+        change.norm() > most ? Eigen::Vector3d(change * (most / change.norm())) : change;
+  };
+  approach(0, options_.acceleration_m_s2);
+  approach(3, options_.angular_acceleration_rad_s2);
+  const Eigen::PartialPivLU<Matrix6> jacobian(ToolJacobian(*scene_, q));
+  JointVector speed = jacobian.solve(reference.twist);
+  if (!speed.allFinite()) return std::nullopt;
+  const double excess = speed.cwiseAbs().cwiseQuotient(scene_->velocity_limit_rad_s).maxCoeff();
+  if (excess > 1.0) {
+    reference.twist /= excess;
+    speed /= excess;
+  }
+  Pose next = reference.world_T_tool;
+  next.translation() += dt * reference.twist.head<3>();
+  const double turn = dt * reference.twist.tail<3>().norm();
+  if (turn > 0.0) next.linear() = Eigen::AngleAxisd(turn, reference.twist.tail<3>().normalized()) * next.linear();
+  JointVector there = q;
+  if (!SolveNearby(*scene_, next, there)) return std::nullopt;
+  const mjModel& model = *scene_->model;
+  for (int i = 0; i < kJointCount; ++i) {
+    const int joint = scene_->joint[static_cast<std::size_t>(i)];
+    const mjtNum* range = model.jnt_range + 2 * joint;
+    if (model.jnt_limited[joint] != 0 && (there[i] < range[0] || there[i] > range[1])) return std::nullopt;
+  }
+  reference.world_T_tool = next;
+  q = there;
+  JointReference result;
+  result.q_rad = q;
+  result.qd_rad_s = speed;
+  return result;
+}
+
+MotionResult SimulatedRobot::FollowTwist(const TwistMotion& motion) {
+  RequirePose(motion.tool_T_frame, "twist");
+  if (!motion.linear_m_s.allFinite() || !motion.angular_rad_s.allFinite()) {
+    throw InputError("twist", "the velocity is not finite");
+  }
+  RequirePositive(motion.duration_s, "twist", "the duration (s)");
+  RequirePositive(motion.contact_force_n, "twist", "the contact force (N)");
+  return Guard([&] {
+    MotionResult result;
+    const Pose start = ToolPose();
+    const bool goes_on = twist_reference_ && twist_reference_->time_s == world_.time_s();
+    TwistReference reference = goes_on ? *twist_reference_ : TwistReference{world_.time_s(), start, Vector6::Zero()};
+    set_point_.reset();
+    JointVector q = q_rad();
+    bool released = sensor_.raw().force_n.norm() <= motion.contact_force_n;
+    Watch watch;
+    watch.tool_force_n = motion.contact_force_n;
+    const auto steps = std::max(1L, std::lround(motion.duration_s / world_.timestep_s()));
+    for (long step = 0; step < steps; ++step) {
+      if (world_.time_s() >= deadline_s_) {
+        result.reason = StopReason::kTimeLimit;
+        result.detail = "the time of the episode is over";
+        break;
+      }
+      // The frame turns with the tool, and so does the velocity that it is to have.
+      const Eigen::Matrix3d world_R_tool = reference.world_T_tool.linear();
+      const Eigen::Matrix3d world_R_frame = world_R_tool * motion.tool_T_frame.linear();
+      Vector6 wanted;
+      wanted.tail<3>() = world_R_frame * motion.angular_rad_s;
+      const Eigen::Vector3d lever = world_R_tool * motion.tool_T_frame.translation();
+      wanted.head<3>() = world_R_frame * motion.linear_m_s - wanted.tail<3>().cross(lever);
+      const auto joints = Advance(wanted, reference, q);
+      if (!joints) {
+        result.reason = StopReason::kUnplanned;
+        result.detail = "the twist leaves the reach or the joint limits of the arm";
+        break;
+      }
+      watch.direction = reference.twist.head<3>().normalized();
+      TrackStep(*joints);
+      if (IsContact(watch, released)) {
+        result.contact = true;
+        result.world_T_tool = tool_at_sensing_;
+        const bool arm = sensor_.ArmForce() > options_.protective_force_n;
+        result.reason = arm ? StopReason::kAborted : StopReason::kContact;
+        if (arm) result.detail = "protective stop: the arm touches something";
+        break;
+      }
+    }
+    if (result.reason == StopReason::kReached) {
+      reference.time_s = world_.time_s();
+      twist_reference_ = reference;
+    } else {
+      Hold(result);
+    }
+    held_orientation_ = reference.world_T_tool.linear();
+    if (!result.contact) result.world_T_tool = ToolPose();
+    result.travelled_m = (result.world_T_tool.translation() - start.translation()).norm();
     return result;
   });
 }

@@ -19,6 +19,7 @@
 #include "env/sensing/noise.h"
 #include "env/transfer_checker.h"
 #include "env/world.h"
+#include "env/wrist_camera.h"
 
 namespace feeler::env {
 
@@ -42,15 +43,28 @@ struct RobotOptions {
   double settle_time_limit_s = 0.1;        ///< or after this time
   double zeroing_time_s = 0.02;            ///< the wrench is averaged over this time to find its zero
   double compliant_reach_m = 1e-3;         ///< a compliant motion that ends this close to its goal has reached it
-  TransferSettings transfer;               ///< the seed in it is replaced by one drawn at reset
-  TransferPlanner transfer_planner;        ///< in place of PlanTransfer with the settings above
+  WristCameraOptions wrist_camera;
+  TransferSettings transfer;         ///< the seed in it is replaced by one drawn at reset
+  TransferPlanner transfer_planner;  ///< in place of PlanTransfer with the settings above
 };
 
 /// What an episode has used up so far.
 struct RobotStatistics {
   double path_length_m = 0.0;  ///< of the tool origin
   double peak_force_n = 0.0;   ///< exact contact force on gripper and tool
+  double impulse_ns = 0.0;     ///< time integral of that force
+  /// Times that something began to touch what nothing but the tool may touch, or the tool what is not the target: any
+  /// contact flag (ContactSensor::PairFlag) but tool-target and tool-robot.
+  int forbidden_contacts = 0;
+  bool forbidden_now = false;  ///< one of them stands
   int steps = 0;               ///< physics steps
+};
+
+/// What FollowTwist leaves for the next call of its kind.
+struct TwistReference {
+  double time_s = 0.0;  ///< another motion in between makes it void
+  Pose world_T_tool = Pose::Identity();
+  Vector6 twist = Vector6::Zero();  ///< of the tool origin, world axes, linear first
 };
 
 /// Everything that later calls depend on: restored, the robot goes on bit for bit.
@@ -71,6 +85,8 @@ struct RobotState {
   Pose tool_at_sensing = Pose::Identity();
   double peak_force_n = 0.0;
   double deadline_s = 0.0;
+  RandomStream image_random;
+  std::optional<TwistReference> twist_reference;
 };
 
 /// The UR10e in MuJoCo behind the robot interface.
@@ -103,6 +119,11 @@ class SimulatedRobot : public Robot {
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult GuardedMove(const GuardedMotion& motion) override;
   MotionResult Compliant(const CompliantMotion& motion) override;
+  /// The wrist camera's picture of this instant. Throws InputError when the machine cannot render.
+  CameraView Look() override;
+  /// Joint-space tracking of the integrated twist at every physics step, within the speed and position limits of the
+  /// joints and the accelerations of the options.
+  MotionResult FollowTwist(const TwistMotion& motion) override;
 
   /// The low-level step: moves the set point of a Cartesian impedance by `delta` (m and rad in world axes, linear
   /// first) and runs `steps` physics steps towards it. The set point starts at the present pose after any other
@@ -141,6 +162,8 @@ class SimulatedRobot : public Robot {
   std::optional<PoseTrajectory> Reachable(const PoseTrajectory& trajectory) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);
   MotionResult Follow(double duration_s, const ReferenceAt& reference_at, const Watch& watch, bool settle);
+  /// Integrates a tool twist for one step, slower where the joints do not allow it. Empty: no way on.
+  std::optional<JointReference> Advance(const Vector6& wanted, TwistReference& reference, JointVector& q) const;
   /// Holds the joints where they are until they rest.
   void Hold(MotionResult& result);
   /// The way points of a transfer; empty, with the reason, when there are none.
@@ -157,6 +180,7 @@ class SimulatedRobot : public Robot {
   Pose MeasuredTool(const JointVector& q_rad) const { return ToolForwardKinematics(world_.scene(), q_rad); }
 
   RobotOptions options_;
+  std::shared_ptr<const Scene> scene_;
   World world_;
   NoiseOptions noise_;
   ContactSensor sensor_;
@@ -165,6 +189,9 @@ class SimulatedRobot : public Robot {
   std::vector<Pose> target_candidates_;
   std::uint64_t transfer_seed_ = 0;
   std::unique_ptr<TransferChecker> transfer_checker_;  ///< made when first needed
+  std::unique_ptr<WristCamera> wrist_camera_;          ///< made when first needed
+  RandomStream image_random_{0, 0, "image"};
+  std::optional<TwistReference> twist_reference_;
   RandomStream encoder_random_{0, 0, "encoder"};
   JointVector encoder_offset_ = JointVector::Zero();
   JointVector deflection_ = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
