@@ -15,5 +15,6 @@ void AddRunCommand(CLI::App& app, Session& session);
 void AddExportCommand(CLI::App& app, Session& session);
 void AddPolicyCommand(CLI::App& app, Session& session);
 void AddExperimentCommand(CLI::App& app, Session& session);
+void AddReportCommand(CLI::App& app, Session& session);
 
 }  // namespace feeler::cli

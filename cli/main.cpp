@@ -62,6 +62,7 @@ int main(int argc, char** argv) {
   feeler::cli::AddExportCommand(app, session);
   feeler::cli::AddPolicyCommand(app, session);
   feeler::cli::AddExperimentCommand(app, session);
+  feeler::cli::AddReportCommand(app, session);
 
   try {
     RequireKnownCommands(app, argc, argv);

@@ -1,0 +1,69 @@
+// feeler report: one self-contained page from a folder of results.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "cli/commands.h"
+#include "core/error.h"
+#include "evaluation/experiment_output.h"
+#include "evaluation/report/page.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string folder;
+  std::string out;
+  double replay_megabytes = 12.0;
+  bool json = false;
+};
+
+void Run(const Flags& flags, Session& session) {
+  (void)session;
+  RequireWritable("--out", flags.out);
+  if (!(flags.replay_megabytes >= 0.0 && flags.replay_megabytes <= 1000.0)) {
+    throw InputError("--replay-megabytes", "out of range", "give 0 to 1000");
+  }
+  const evaluation::Results results = evaluation::ReadResults(flags.folder);
+  for (const evaluation::Fault& fault : results.faults) {
+    fmt::print(stderr, "feeler: warning: {}\n", evaluation::ToString(fault));
+  }
+  evaluation::ReportOptions options;
+  options.replay_bytes = std::llround(1e6 * flags.replay_megabytes);
+  const std::string page = evaluation::ReportPage(results, flags.folder, options);
+  evaluation::WriteFileAtomically(flags.out, page);
+
+  std::size_t episodes = 0;
+  for (const evaluation::ReportedRecords& records : results.records) episodes += records.episodes.size();
+  const std::string path = std::filesystem::absolute(flags.out).lexically_normal().string();
+  if (flags.json) {
+    PrintJson({{"experiments", results.experiments.size()},
+               {"episodes", episodes},
+               {"faults", results.faults.size()},
+               {"bytes", page.size()},
+               {"path", path}});
+    return;
+  }
+  fmt::print("{} experiments, {} episodes, {} faults, {:.1f} MB\n{}\n", results.experiments.size(), episodes,
+             results.faults.size(), 1e-6 * static_cast<double>(page.size()), path);
+}
+
+}  // namespace
+
+void AddReportCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("report", "One self-contained page: tables, figures, failures, replays");
+  command->add_option("dir", flags->folder, "folder of results (feeler experiment --out) or records (feeler run --out)")
+      ->required();
+  command->add_option("--out", flags->out, "the page to write, e.g. report.html")->required();
+  command
+      ->add_option("--replay-megabytes", flags->replay_megabytes,
+                   "how much of the page replays may take; failures come first")
+      ->capture_default_str();
+  command->add_flag("--json", flags->json, "print what was reported as JSON");
+  command->callback([flags, &session] { Run(*flags, session); });
+}
+
+}  // namespace feeler::cli
