@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
 #include "core/lattice.h"
+#include "core/robot.h"
 #include "planner/belief/problem.h"
 
 namespace feeler::policies {
@@ -23,6 +25,24 @@ struct Belief {
 /// without, it inserts at the mean of the hypotheses left (open loop).
 struct Insert {
   bool confirm = true;
+  /// Where the target is, as seen from the tool that stands still; takes the place of the hypotheses.
+  std::optional<Pose> tool_T_target = std::nullopt;
+};
+
+/// Follow a velocity for its duration (zero: stay), then look: the picture goes to `Policy::See` before the next
+/// decision.
+struct Servo {
+  TwistMotion motion;
+};
+
+/// Inserts without having localized: the tool is pressed lightly on the face around the opening, at the mean of the
+/// hypotheses left, and slides outwards along an Archimedean spiral until it drops in.
+struct SpiralSearch {
+  double radius_m = 0.0045;
+  double pitch_m = 0.0015;  ///< from turn to turn
+  double speed_m_s = 0.02;
+  double press_n = 10.0;
+  double face_range_m = 0.003;  ///< the face is looked for this far to both sides of where it is expected
 };
 
 /// The policy has no further move. The reason stands in the episode record.
@@ -31,13 +51,14 @@ struct GiveUp {
 };
 
 /// What to do next. Executors visit every alternative.
-using Decision = std::variant<GuardedMove, Insert, GiveUp>;
+using Decision = std::variant<GuardedMove, Insert, GiveUp, SpiralSearch, Servo>;
 
 /// Decides the next action from what has been felt so far. One object serves many episodes, one after the other:
 /// `Begin` erases the past. Not thread-safe: one object per thread. The caller accounts the CPU time of the calls as
 /// planning time.
 ///
-/// Protocol: Begin, then Next and Observe in turn until Next returns something else than a guarded move. `Next` is
+/// Protocol: Begin, then Next and Observe (after a Servo: See) in turn until Next returns something else than a guarded
+/// move or a Servo; guarded moves come before the first Servo. `Next` is
 /// repeatable: without an Observe in between it returns the same decision.
 class Policy {
  public:
@@ -55,6 +76,9 @@ class Policy {
   /// Tells the outcome, in lattice terms, that the executor settled on for the move last returned by Next. False when
   /// the policy holds no plan for that outcome; it is then as before the call and may be told another outcome.
   virtual bool Observe(const Outcome& outcome) = 0;
+
+  /// The picture after the last Servo decision.
+  virtual void See(const CameraView& /*view*/) {}
 };
 
 }  // namespace feeler::policies
