@@ -3,6 +3,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <numbers>
 #include <thread>
@@ -11,7 +13,9 @@
 #include "cli/progress_bar.h"
 #include "cli/solver_flags.h"
 #include "core/error.h"
+#include "env/axis_visibility.h"
 #include "env/image.h"
+#include "env/pipe_parts.h"
 #include "env/renderer.h"
 #include "env/scene.h"
 #include "workflow/planning_setup.h"
@@ -27,6 +31,9 @@ struct Flags {
   std::string out;
   bool json = false;
 };
+
+/// Walls nearer to a lattice plane than this can be read as a neighbour's.
+constexpr double kNearWall_cells = 0.1;
 
 nlohmann::json AxisJson(const UncertainAxis& axis) {
   return {{"axis", ToString(axis.kind)},
@@ -51,6 +58,15 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
   const planner::ContactMap& map = *setup.map;
   nlohmann::json axes = nlohmann::json::array();
   for (const UncertainAxis& axis : task.axes) axes.push_back(AxisJson(axis));
+  nlohmann::json felt = nlohmann::json::array();
+  for (const env::AxisVisibility& axis : env::AxisVisibilities(task, map)) {
+    felt.push_back({{"axis", ToString(axis.kind)},
+                    {"felt", axis.felt()},
+                    {"largest_difference_cells", axis.largest_difference_cells},
+                    {"fewest_probes", axis.fewest_probes},
+                    {"alike_pairs", axis.alike_pairs},
+                    {"pairs", axis.pairs}});
+  }
   const Cell size = map.domain().Size();
   return {{"task", task.name},
           {"file", setup.model.file.string()},
@@ -68,6 +84,8 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
             {"per_contact", task.cost.per_contact},
             {"per_action", task.cost.per_action}}},
           {"goal", ToString(task.goal)},
+          {"turns_freely", task.turns_freely},
+          {"felt", felt},
           {"move_lengths", task.move_lengths},
           {"contact_map",
            {{"opening", env::ToString(setup.opening)},
@@ -75,7 +93,21 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
             {"orientations", map.orientations()},
             {"blocked_share", BlockedShare(map)},
             {"phase", {map.phase().x(), map.phase().y(), map.phase().z()}},
-            {"margin_cells", map.margin_cells()}}}};
+            {"margin_cells", map.margin_cells()},
+            {"walls_within_tenth", env::ShareOfWallsNear(map, kNearWall_cells)}}}};
+}
+
+void PrintVisibility(const env::AxisVisibility& axis) {
+  if (!axis.felt()) {
+    fmt::print(
+        "felt           {}: NOT SEEN by contact (no probe differs by more than {:.3f} cells): drop the axis, or give "
+        "the part a feature\n",
+        ToString(axis.kind), axis.largest_difference_cells);
+    return;
+  }
+  fmt::print("felt           {}: neighbours differ in {} probes at least, by up to {:.2f} cells{}\n",
+             ToString(axis.kind), axis.fewest_probes, axis.largest_difference_cells,
+             axis.alike_pairs == 0 ? "" : fmt::format("; {} of {} pairs are alike", axis.alike_pairs, axis.pairs));
 }
 
 void PrintTask(const workflow::PlanningSetup& setup) {
@@ -104,8 +136,15 @@ void PrintTask(const workflow::PlanningSetup& setup) {
   fmt::print("contact map    {} x {} x {} displacements of {:.4g} mm, {} orientation{}, opening {}, {:.1f} % blocked\n",
              size.x(), size.y(), size.z(), task.cell_m * 1000, map.orientations(), map.orientations() == 1 ? "" : "s",
              env::ToString(setup.opening), 100 * BlockedShare(map));
-  fmt::print("lattice phase  {:.3f}, {:.3f}, {:.3f} cells; walls at least {:.3f} cells from a lattice plane\n",
-             map.phase().x(), map.phase().y(), map.phase().z(), map.margin_cells());
+  fmt::print("lattice phase  {:.3f}, {:.3f}, {:.3f} cells; walls{} at least {:.3f} cells from a lattice plane\n",
+             map.phase().x(), map.phase().y(), map.phase().z(),
+             map.orientations() == 1 ? "" : " of the target as estimated", map.margin_cells());
+  if (map.orientations() > 1) {
+    fmt::print("               turned, {:.1f} % of what is met lies within {} cells of one\n",
+               100 * env::ShareOfWallsNear(map, kNearWall_cells), kNearWall_cells);
+  }
+  if (task.turns_freely) fmt::print("mating         round: a turn about the insertion axis is no error\n");
+  for (const env::AxisVisibility& axis : env::AxisVisibilities(task, map)) PrintVisibility(axis);
 }
 
 void Show(const Flags& flags) {
@@ -133,6 +172,20 @@ void Render(const Flags& flags) {
   RequireWritable("--out", flags.out);
   const env::Scene scene = env::BuildScene(env::LoadTask(flags.task));
   env::WritePng(env::RenderSceneImage(scene, view), flags.out);
+}
+
+void MakePipeParts(const env::PipeParameters& parameters, const std::string& folder) {
+  if (!std::filesystem::is_directory(folder)) {
+    throw InputError("--out", "\"" + folder + "\" is not a folder", "make it first");
+  }
+  for (const env::PartFile& part : env::GeneratePipeParts(parameters)) {
+    const std::string path = (std::filesystem::path(folder) / part.name).string();
+    std::ofstream file(path);
+    file << part.text;
+    file.close();
+    if (!file) throw InputError("--out", "cannot write " + path);
+    fmt::print("{}\n", path);
+  }
 }
 
 void List(bool json) {
@@ -164,6 +217,24 @@ void AddTaskCommand(CLI::App& app, Session& /*session*/) {
   render->add_option("--view", flags->view, "overview or close-up")->capture_default_str();
   render->add_option("--out", flags->out, "PNG file to write")->required();
   render->callback([flags] { Render(*flags); });
+
+  CLI::App* pipes =
+      task->add_subcommand("make-pipe-parts", "Writes the parts of pipes and elbows from sizes in metres");
+  auto sizes = std::make_shared<env::PipeParameters>();
+  const auto size = [&](const char* name, double& value, const char* help) {
+    pipes->add_option(name, value, help)->capture_default_str();
+  };
+  size("--pipe-diameter", sizes->pipe_diameter_m, "outside of a pipe");
+  size("--elbow-diameter", sizes->elbow_diameter_m, "outside of an elbow");
+  size("--clearance", sizes->clearance_m, "between pipe and bore, on each side");
+  size("--chamfer", sizes->chamfer_m, "of the rim of a bore");
+  size("--bore-depth", sizes->bore_depth_m, "of a bore");
+  size("--side-arm", sizes->side_arm_m, "from the axis of the socket to the end of the side arm");
+  size("--socket-to-arm", sizes->socket_to_arm_m, "from the mouth of a fixed elbow to the axis of its side arm");
+  size("--held-pipe", sizes->held_pipe_m, "length of the pipe in the gripper");
+  size("--lid-recess", sizes->lid_recess_m, "from the rim down to the lid that closes the bore for planning");
+  pipes->add_option("--out", flags->out, "folder for the files")->required();
+  pipes->callback([flags, sizes] { MakePipeParts(*sizes, flags->out); });
 }
 
 }  // namespace feeler::cli

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/orientation_lattice.h"
 
 namespace feeler::env {
 namespace {
@@ -54,7 +55,8 @@ Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vec
                      "give one per axis");
   }
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  double yaw_rad = 0.0;
+  double pitch_rad = 0.0;
   for (std::size_t i = 0; i < extents.size(); ++i) {
     const UncertainAxis& axis = task.axes[i];
     if (extents[i] < 1) throw InputError("extents", fmt::format("{} is not an extent", extents[i]), "give 1 or more");
@@ -64,13 +66,22 @@ Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vec
       case AxisKind::kX: offset_m.x() = value; break;
       case AxisKind::kY: offset_m.y() = value; break;
       case AxisKind::kZ: offset_m.z() = value; break;
-      case AxisKind::kYaw: turn = turn * Eigen::AngleAxisd(value, Eigen::Vector3d::UnitZ()); break;
-      case AxisKind::kPitch: turn = turn * Eigen::AngleAxisd(value, Eigen::Vector3d::UnitY()); break;
+      case AxisKind::kYaw: yaw_rad = value; break;
+      case AxisKind::kPitch: pitch_rad = value; break;
     }
   }
+  // Around the centre of the angles, which may lie half a step beside the lattice frame.
+  const Eigen::Quaterniond frame_R_estimate = FrameREstimate(task, extents);
+  const Eigen::Matrix3d world_R_frame = world_T_estimate.linear() * frame_R_estimate.inverse().toRotationMatrix();
+  const Eigen::Matrix3d center = frame_R_estimate.toRotationMatrix();
+  const double center_yaw_rad = std::atan2(center(1, 0), center(0, 0));
+  const double center_pitch_rad = std::atan2(-center(2, 0), center(2, 2));
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(center_yaw_rad + yaw_rad, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(center_pitch_rad + pitch_rad, Eigen::Vector3d::UnitY()))
+                                   .toRotationMatrix();
   Pose truth = world_T_estimate;
-  truth.translation() += world_T_estimate.linear() * offset_m;
-  truth.linear() = world_T_estimate.linear() * turn;
+  truth.translation() += world_R_frame * offset_m;
+  truth.linear() = world_R_frame * turn;
   return truth;
 }
 

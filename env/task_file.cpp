@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/orientation_lattice.h"
 #include "env/mujoco_handles.h"
 #include "env/overlap_judge.h"
 #include "env/task_fields.h"
@@ -151,22 +152,8 @@ FeltGeoms GeomsOf(const TaskModel& task_model, Opening opening) {
 }
 
 std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
-  const auto angles = [&](AxisKind kind) {
-    std::vector<double> values = {0.0};
-    for (const UncertainAxis& axis : task.axes) {
-      if (axis.kind != kind) continue;
-      values.clear();
-      for (int k = 0; k < axis.max_cells; ++k) values.push_back((k - (axis.max_cells - 1) / 2.0) * axis.resolution);
-    }
-    return values;
-  };
   std::vector<Eigen::Quaterniond> orientations;
-  for (const double yaw : angles(AxisKind::kYaw)) {
-    for (const double pitch : angles(AxisKind::kPitch)) {
-      orientations.emplace_back(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
-                                Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()));
-    }
-  }
+  for (int k = 0; k < LatticeOrientations(task); ++k) orientations.push_back(LatticeOrientation(task, k));
   return orientations;
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 
+#include "core/orientation_lattice.h"
 #include "execution/insertion.h"
 #include "execution/localizer.h"
 
@@ -104,7 +106,22 @@ bool IsSure(const Task& task, const TargetFit& fit) {
 
 LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
   const Region hull = HullOf(problem.hypotheses);
-  return {world_T_estimate, 0.5 * (hull.lower + hull.upper), task.cell_m};
+  // The estimate is the centre of the chosen angles, which may lie half a step beside the frame (orientation_lattice.h).
+  std::vector<int> extents;
+  for (const UncertainAxis& axis : task.axes) {
+    std::set<int> places;
+    const int pitches = LatticeAngles(task, AxisKind::kPitch);
+    for (const planner::Hypothesis& h : problem.hypotheses) {
+      if (axis.kind == AxisKind::kYaw) places.insert(h.orientation / pitches);
+      if (axis.kind == AxisKind::kPitch) places.insert(h.orientation % pitches);
+    }
+    extents.push_back(std::max(1, static_cast<int>(places.size())));
+  }
+  Pose world_T_frame = world_T_estimate;
+  if (LatticeOrientations(task) > 1) {
+    world_T_frame.linear() = world_T_estimate.linear() * FrameREstimate(task, extents).inverse().toRotationMatrix();
+  }
+  return {world_T_frame, 0.5 * (hull.lower + hull.upper), task.cell_m};
 }
 
 void RecordEstimate(const Episode& episode, const LatticeFrame& frame, const TargetFit& fit) {

@@ -46,7 +46,8 @@ struct Attempt {
   int orientation = 0;
 };
 
-/// The lattice frame of a problem whose hypotheses have their centre at the estimate.
+/// The lattice frame of a problem whose hypotheses have their centre at the estimate; its axes are those of the lattice
+/// of orientations (core/orientation_lattice.h).
 LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate);
 
 /// Follows the policy from the start pose of the problem, confirms, inserts. Fills the record as it goes. Throws

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "execution/attempt.h"
 #include "execution/fallback_ladder.h"
+#include "execution/pose_attempt.h"
 
 namespace feeler::execution {
 namespace {
@@ -31,6 +32,11 @@ ExecutionRecord Execute(const Task& task, const planner::Problem& problem, const
   ExecutionRecord record;
   const Episode episode{task, robot, options, record, robot.Time()};
   try {
+    if (HasAngles(problem) && options.travel_model) {
+      record.reason = RunPoseAttempt(episode, problem, world_T_estimate, policy, *options.travel_model);
+      record.sim_time_s = robot.Time() - episode.started_s;
+      return record;
+    }
     const Attempt attempt = RunAttempt(episode, problem, world_T_estimate, policy);
     record.reason = attempt.reason;
     if (options.ladder && attempt.end != AttemptEnd::kInserted) {

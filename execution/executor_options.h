@@ -5,6 +5,7 @@
 #include "execution/contact_evidence.h"
 #include "execution/online_planner.h"
 #include "execution/outcome_matching.h"
+#include "planner/contact/travel_model.h"
 
 namespace feeler::execution {
 
@@ -33,6 +34,9 @@ struct ExecutorOptions {
   bool ladder = false;
   /// Plans around a refit; may be shared by many executors. Null: one is made when first needed.
   std::shared_ptr<OnlinePlanner> online_planner;
+  /// The geometry of the task, with the opening as it is: needed where the orientation of the target is uncertain
+  /// (pose_attempt.h). Used by one execution at a time.
+  std::shared_ptr<planner::TravelModel> travel_model;
   MatchOptions matching;
   FitOptions fit;
 

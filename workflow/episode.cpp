@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "env/exact_travel.h"
 #include "env/oversize_target.h"
 #include "workflow/cpu_clock.h"
 #include "workflow/fall_in_draw.h"
@@ -112,6 +113,9 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
     }
     options.ladder = options_.ladder;
     options.online_planner = online_planner_;
+    if (setup_->map->orientations() > 1) {
+      options.travel_model = std::make_shared<env::ExactTravel>(setup_->model, env::Opening::kOpen);
+    }
     if (options_.confirm_limit_m) options.confirm_limit_m = *options_.confirm_limit_m;
     record.execution =
         execution::Execute(task, problem, draw.world_T_estimate, *policy, environment_->robot(), options);
