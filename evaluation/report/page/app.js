@@ -19,6 +19,7 @@ window.addEventListener("unhandledrejection", (event) => FeelerReport.errors.pus
   find("theme").addEventListener("click", () => {
     const dark = document.documentElement.dataset.theme ? document.documentElement.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     theme(dark ? "light" : "dark");
+    if (FeelerReport.player) FeelerReport.player.draw();
     try { localStorage.setItem("feeler-theme", dark ? "light" : "dark"); } catch (error) { /* as above */ }
   });
 
@@ -51,7 +52,17 @@ window.addEventListener("unhandledrejection", (event) => FeelerReport.errors.pus
   };
   window.addEventListener("hashchange", openHash);
   openHash();
-  window.addEventListener("beforeprint", () => document.querySelectorAll(".provenance, #episodes details").forEach((d) => { d.open = true; }));
+  const picture = (background) => {
+    const stage = FeelerReport.player && FeelerReport.player.stage;
+    if (!stage) return;
+    stage.background = background;
+    stage.render();
+  };
+  window.addEventListener("beforeprint", () => {
+    document.querySelectorAll(".provenance, #episodes details").forEach((d) => { d.open = true; });
+    picture("#eef0f1");  // paper is white whatever the screen is
+  });
+  window.addEventListener("afterprint", () => picture(null));
   FeelerReport.ready = true;
   FeelerReport.ready_ms = performance.now();
 })();

@@ -21,8 +21,7 @@ const Format = {
   tick(value) { return value === 0 ? "0" : Math.abs(value) >= 10000 ? value.toLocaleString("en-US") : String(+value.toPrecision(4)); },
   percent(value) {
     if (value === null || value === undefined) return "–";
-    const percent = 100 * value;
-    return (percent === 100 || percent === 0 || Math.abs(percent) >= 10 && Number.isInteger(percent)) ? percent.toFixed(0) : percent.toFixed(1);
+    return String(+(100 * value).toFixed(1));
   },
   /** "sim_time_median_s" -> "sim time median, s"; what is read often has a better name. */
   column(name) {

@@ -27,7 +27,7 @@ const Plots = {
 
   legend(entries) {
     return element("div", { class: "legend" }, entries.map((e) =>
-      element("span", {}, element("i", { style: e.hollow ? "border:2px solid var(--printed)" : `background:${e.color}` }), e.name)));
+      element("span", {}, element("i", { class: e.hollow ? "hollow" : null, style: e.hollow ? null : `background:${e.color}` }), e.name)));
   },
 
   ticks(scale, log, count) {
@@ -69,7 +69,7 @@ const Plots = {
             g.append("line").attr("class", "interval").attr("stroke", mark.color).attr("x1", x(options.log ? Math.max(mark.low, x.domain()[0]) : mark.low)).attr("x2", x(mark.high)).attr("y1", at).attr("y2", at);
           }
           const dot = mark.printed
-            ? g.append("path").attr("class", "printed-mark").attr("d", d3.symbol(d3.symbolDiamond, 62)()).attr("transform", `translate(${x(mark.value)},${at})`)
+            ? g.append("path").attr("class", "printed-mark").attr("d", d3.symbol().type(d3.symbolDiamond).size(64)()).attr("transform", `translate(${x(mark.value)},${at})`)
             : g.append("circle").attr("class", "dot").attr("cx", x(mark.value)).attr("cy", at).attr("r", 4.5).attr("fill", mark.color);
           dot.append("title").text(`${row.label}: ${Format.number(mark.value)}${mark.low !== undefined && mark.low !== null ? ` [${Format.number(mark.low)}, ${Format.number(mark.high)}]` : ""}${mark.printed ? " (printed)" : ""}`);
         });

@@ -13,8 +13,8 @@ class Scene3D {
     this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
     this.renderer.autoClear = false;
     this.scene = new THREE.Scene();
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f96, 0.62));
-    this.sun = new THREE.DirectionalLight(0xfff6e8, 0.75);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0a8, 0.78));
+    this.sun = new THREE.DirectionalLight(0xfff6e8, 0.55);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(2048, 2048);
     this.sun.shadow.bias = -0.0004;
@@ -183,7 +183,7 @@ class Scene3D {
       this.cameras[name].lookAt(target);
       this.controls[name].update();
     };
-    place("near", mouth.clone().add(new THREE.Vector3(0, 0, 0.022)), new THREE.Vector3(-0.17, -0.24, 0.15));
+    place("near", mouth.clone().add(new THREE.Vector3(0, 0, 0.022)), new THREE.Vector3(-0.13, -0.19, 0.13));
     const middle = new THREE.Vector3(mouth.x * 0.5, mouth.y * 0.5, 0.36);
     place("arm", middle, new THREE.Vector3(0.75, -1.55, 0.62));
     place("above", mouth.clone(), new THREE.Vector3(-0.002, -0.004, 0.5));
@@ -261,6 +261,7 @@ class Scene3D {
 
   render() {
     if (!this.world || !this.resize()) return;
+    this.renderer.setClearColor(new THREE.Color(this.background || getComputedStyle(this.canvas.parentElement).backgroundColor), 1);
     const inset = this.width > 420 && this.view !== "above" ? (this.view === "near" ? "arm" : "near") : null;
     this.renderer.setScissorTest(false);
     this.renderer.setViewport(0, 0, this.width, this.height);
@@ -271,10 +272,8 @@ class Scene3D {
       this.renderer.setViewport(edge, edge, w, h);
       this.renderer.setScissor(edge, edge, w, h);
       this.renderer.setScissorTest(true);
-      this.renderer.clearDepth();
-      this.scene.background = this.insetColor || null;
+      this.renderer.clear();
       this.draw(this.cameras[inset], w, h);
-      this.scene.background = null;
       this.renderer.setScissorTest(false);
     }
   }

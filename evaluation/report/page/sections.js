@@ -6,12 +6,13 @@ const VIEWS = {
   "table1-plug": { title: "Table I · solvers on the plug", columns: ["row", "setting", "problems", "attempts", "success_percent", "relative_speedup_cpu", "relative_speedup_expansions", "relative_cost_to_base", "cost_to_certified", "cpu_s", "expansions"], dots: ["success_percent", "relative_speedup_cpu", "relative_cost_to_base"], log: ["relative_speedup_cpu"] },
   "table4-pipe": { title: "Table IV · solvers on the pipe", columns: ["row", "setting", "problems", "attempts", "success_percent", "relative_speedup_cpu", "relative_speedup_expansions", "relative_cost_to_base", "cost_to_certified", "cpu_s", "expansions"], dots: ["success_percent", "relative_speedup_cpu", "relative_cost_to_base"], log: ["relative_speedup_cpu"] },
   "table3-ablation": { title: "Table III · experience and order", columns: ["row", "setting", "problems", "attempts", "success_percent", "relative_speedup_cpu", "relative_speedup_expansions", "relative_cost_to_base", "cost_to_certified", "cpu_s"], dots: ["success_percent", "relative_speedup_cpu", "relative_cost_to_base"], log: ["relative_speedup_cpu"] },
-  "table2-framework": { title: "Table II · the whole framework" },
-  "figure-tbl": { title: "The figure on touch-based localization" },
+  "table2-framework": { title: "Table II · the whole framework", columns: ["row", "episodes", "rate", "time_median_s", "path_median_m", "force_median_n", "contacts_mean", "moves_mean", "plan_cpu_mean_s", "ladder_use", "rejected_placements"], dots: ["rate", "time_median_s"] },
+  "figure-tbl": { title: "Cost and planning time against touch-based localization", columns: ["cost", "hypotheses", "policy", "walks", "localized", "cost_mean", "relative_cost", "plan_cpu_s", "moves_mean", "contacts_mean"] },
   "acceptance-closed-loop": { title: "The closed loop in physics", columns: ["row", "size", "episodes", "inserted", "rate", "required", "ladder_use", "time_mean_s", "time_max_s", "error_p50_mm", "error_p95_mm", "moves", "contacts", "peak_force_n"], dots: ["rate"], judged: "required" },
   bounds: { title: "Bounds of the certified solver over time", lines: { x: "time_s", y: "ratio", by: ["opening", "extents"], x_log: true, y_log: true, y_label: "upper / lower bound" }, collapse: true },
-  baselines: { title: "Baselines" },
-  noise: { title: "What breaks first" },
+  baselines: { title: "Baselines over the same episodes", columns: ["task", "policy", "uncertainty_mm", "episodes", "rate", "time_median_s", "path_median_m", "force_median_n", "contacts_mean", "plan_cpu_mean_s", "ladder_use"] },
+  noise: { title: "What breaks first", columns: ["noise", "level", "unit", "policy", "episodes", "rate", "time_median_s", "path_median_m", "force_median_n", "contacts_mean", "ladder_use"] },
+  "spiral-tuning": { title: "How the spiral was tuned", columns: ["task", "pitch_mm", "speed_mm_s", "force_n", "episodes", "rate", "time_median_s", "force_median_n"] },
   "acceptance-guarded-moves": { title: "Guarded moves against geometry" },
   "acceptance-transfers": { title: "Transfers among obstacles" },
 };
@@ -44,7 +45,7 @@ const Sections = {
     return worth.map((cell) => {
       const scale = cell.share ? 100 : 1, known = (v) => (typeof v === "number" ? scale * v : null);
       const rows = experiment.rows.map((row, k) => ({ row, label: labels[k], marks: [{ value: known(row[cell.index]), low: known(row[cell.low]), high: known(row[cell.high]), color: "var(--accent)" },
-        ...(cell.printed !== undefined && typeof row[cell.printed] === "number" ? [{ value: known(row[cell.printed]), printed: true }] : [])].filter((m) => m.value !== null) })).filter((r) => r.marks.length && plotted(r.row));
+        ...(cell.printed !== undefined && typeof row[cell.printed] === "number" ? [{ value: known(Tables.printed(cell, row)), printed: true }] : [])].filter((m) => m.value !== null) })).filter((r) => r.marks.length && plotted(r.row));
       if (!rows.length) return null;
       const printed = rows.some((r) => r.marks.some((m) => m.printed));
       const isPercent = cell.share || /percent/.test(cell.name);
@@ -88,15 +89,15 @@ const Sections = {
     return section;
   },
 
-  /** "stuck: at 3 mm" counts as "stuck". */
-  kindOfReason(reason) { return reason.split(":")[0]; },
+  /** "insertion: stopped after 0.02 of 18 mm" counts as "insertion: stopped after". */
+  kindOfReason(reason) { return reason.split(/\s*[-+(]?\d/)[0] || reason; },
 
   episodes(section, data, go) {
     if (!data.records.length) return;
     const total = data.records.reduce((n, r) => n + r.episodes.length, 0), replays = data.records.reduce((n, r) => n + r.episodes.filter((e) => e.replay >= 0).length, 0);
     section.append(element("h2", {}, "Episodes"), element("p", { class: "soft" }, `${total.toLocaleString("en-US")} episodes in ${data.records.length} file${data.records.length > 1 ? "s" : ""}; ${replays.toLocaleString("en-US")} have a replay in this page` + (replays < total ? " (failures first, then episodes that needed fallbacks, then some of every run)." : ".")));
     const rows = data.records.map((run) => ({ label: run.label, points: run.episodes.map((e) => ({ x: e.time_s, good: e.inserted, title: `episode ${e.episode}: ${e.reason}, ${e.time_s.toFixed(2)} s${e.replay >= 0 ? " (click for the replay)" : ""}`, go: e.replay >= 0 ? () => go(e.replay) : null })) }));
-    const printed = [...new Set(data.records.map((r) => Summary.printedTask(data, r.task)))];
+    const printed = [...new Set(data.records.map((r) => Summary.printedTask(data, r.task)).filter(Boolean))];
     if (rows.length <= 60) {
       section.append(Plots.strips("Seconds on the robot", "a dot an episode, a bar the median of the inserted ones", rows, { label: "simulated seconds from the start pose to the verdict", marks: printed.map((p) => ({ x: p[2], label: `paper, ${p[0].split(" ")[0]}: ${p[2]} s` })),
         legend: [{ name: "inserted", color: "var(--accent)" }, { name: "failed", color: "var(--bad)" }] }));

@@ -2,10 +2,11 @@
 "use strict";
 
 const Summary = {
-  /** Episodes of the same task, policy and noise, over all files. */
-  groups(records) {
+  /** Episodes of the same task, policy and noise. Those of an experiment count there; here only if nothing else does. */
+  groups(data) {
+    const own = data.records.filter((run) => !data.experiments.some((e) => ("/" + run.file).includes("/" + e.name + "/")));
     const groups = new Map();
-    for (const run of records) {
+    for (const run of own.length ? own : data.records) {
       const key = [run.task, run.policy, run.noise].join("|");
       if (!groups.has(key)) groups.set(key, { task: run.task, policy: run.policy, noise: run.noise, episodes: [] });
       groups.get(key).episodes.push(...run.episodes);
@@ -16,16 +17,8 @@ const Summary = {
   rate(episodes) { return Statistics.wilson(episodes.filter((e) => e.inserted).length, episodes.length); },
   time(episodes) { return Statistics.quantile(episodes.filter((e) => e.inserted).map((e) => e.time_s), 0.5); },
 
-  column(experiment, ...patterns) {
-    for (const pattern of patterns) {
-      const index = experiment.columns.findIndex((c) => pattern.test(c));
-      if (index >= 0) return index;
-    }
-    return -1;
-  },
-
   find(data, name) { return data.experiments.find((e) => e.name === name); },
-  printedTask(data, task) { return data.paper.table2_framework.rows.find((r) => r[0].startsWith(task.startsWith("pipe") ? "pipe" : "plug")); },
+  printedTask(data, task) { return data.paper.table2_framework.rows.find((r) => r[0].startsWith(task === "plug" ? "plug" : /^pipe/.test(task) ? "pipe" : "-")); },
 
   card(what, value, unit, interval, paper, baseline) {
     return element("div", { class: "card" }, element("div", { class: "what" }, what), element("div", { class: "value" }, value, unit ? element("small", {}, " " + unit) : null),
@@ -35,46 +28,52 @@ const Summary = {
 
   percentText(rate) { return `95 % interval ${Format.percent(rate.low)} to ${Format.percent(rate.high)}, ${rate.successes} of ${rate.trials}`; },
 
-  /** Success and time of a task: from table2-framework, else from the records. */
-  taskCards(data, groups) {
-    const cards = [], framework = Summary.find(data, "table2-framework");
-    const ours = [];
+  /** [{policy, rate, time, note}] of the other policies on a task: from the baselines at their widest, else from records. */
+  others(data, groups, task) {
+    const table = Summary.find(data, "baselines");
+    if (table) {
+      const at = (name) => table.columns.indexOf(name), rows = table.rows.filter((r) => r[at("task")] === task);
+      const widest = Math.max(...rows.map((r) => r[at("uncertainty_mm")]));
+      return rows.filter((r) => r[at("uncertainty_mm")] === widest && !String(r[at("policy")]).startsWith("database"))
+        .map((r) => ({ policy: r[at("policy")], rate: r[at("rate")], time: r[at("inserted")] > 0 ? r[at("time_median_s")] : null, note: ` (±${Format.number(widest / 2)} mm)` }));
+    }
+    return groups.filter((g) => g.task === task && g.policy !== "database" && g.noise === "ideal").map((g) => ({ policy: g.policy, rate: Summary.rate(g.episodes).value, time: Summary.time(g.episodes), note: "" }));
+  },
+
+  /** Our success and time by task: from table2-framework, else from the records. */
+  ours(data, groups) {
+    const framework = Summary.find(data, "table2-framework");
     if (framework) {
-      const c = (...p) => Summary.column(framework, ...p);
-      const task = c(/^task$/, /task/), rate = c(/^inserted_rate$/, /^rate$/, /^success(_rate)?$/, /success.*percent/, /rate/), time = c(/time.*median/, /median.*s$/, /time/);
-      const plan = Tables.plan(framework.columns.map(String)).find((p) => p.index === rate) || {};
-      for (const row of framework.rows) {
-        const scale = /percent/.test(framework.columns[rate] || "") ? 0.01 : 1;
-        if (rate < 0 || typeof row[rate] !== "number") continue;
-        ours.push({ task: String(row[task] ?? "plug"), value: scale * row[rate], low: plan.low !== undefined ? scale * row[plan.low] : null, high: plan.high !== undefined ? scale * row[plan.high] : null, time: time >= 0 ? row[time] : null, note: "table2-framework" });
-      }
+      const at = (name) => framework.columns.indexOf(name);
+      return ["plug", "pipe"].map((task) => ({ task, row: framework.rows.find((r) => String(r[at("row")]).startsWith(task)) })).filter((o) => o.row)
+        .map(({ task, row }) => ({ task, value: row[at("rate")], low: row[at("rate_low")], high: row[at("rate_high")], time: row[at("inserted")] > 0 ? row[at("time_median_s")] : null, note: `${row[at("inserted")]} of ${row[at("episodes")]} episodes, table2-framework` }));
     }
-    if (!ours.length) {
-      for (const g of groups.filter((g) => g.policy === "database" && g.noise === "ideal")) {
-        const rate = Summary.rate(g.episodes);
-        ours.push({ task: g.task, value: rate.value, low: rate.low, high: rate.high, time: Summary.time(g.episodes), note: `${rate.successes} of ${rate.trials} episodes` });
+    const rest = groups.filter((g) => g.policy === "database" && g.noise === "ideal").map((g) => {
+      const rate = Summary.rate(g.episodes);
+      return { task: g.task, value: rate.value, low: rate.low, high: rate.high, time: Summary.time(g.episodes), note: `${rate.successes} of ${rate.trials} episodes` };
+    });
+    return rest.sort((a, b) => (b.task === "plug") - (a.task === "plug")).slice(0, 2);
+  },
+
+  taskCards(data, groups) {
+    return Summary.ours(data, groups).flatMap((own) => {
+      const printed = Summary.printedTask(data, own.task), others = Summary.others(data, groups, own.task).slice(0, 8), sort = (list, by) => [...list].sort(by);
+      const cards = [Summary.card(`${own.task}: inserted`, Format.percent(own.value), "%", `95 % interval ${Format.percent(own.low)} to ${Format.percent(own.high)} · ${own.note}`,
+        printed ? `${printed[1]} %` : null, sort(others, (a, b) => b.rate - a.rate).map((o) => `${o.policy}${o.note}: ${Format.percent(o.rate)} %`))];
+      if (own.time !== null) {
+        cards.push(Summary.card(`${own.task}: time on the robot`, Format.number(own.time), "s", "median of inserted, start pose to verdict, simulated", printed ? `${printed[2]} s` : null,
+          sort(others.filter((o) => o.time !== null), (a, b) => a.time - b.time).map((o) => `${o.policy}${o.note}: ${Format.number(o.time)} s`)));
       }
-      ours.sort((a, b) => (a.task === "plug" ? -1 : b.task === "plug" ? 1 : 0));
-    }
-    for (const own of ours.slice(0, 2)) {
-      const printed = Summary.printedTask(data, own.task);
-      const others = groups.filter((g) => g.task === own.task && g.policy !== "database" && g.noise === "ideal");
-      cards.push(Summary.card(`${own.task}: inserted`, Format.percent(own.value), "%", (own.low !== null ? `95 % interval ${Format.percent(own.low)} to ${Format.percent(own.high)}` : "") + (own.note ? ` · ${own.note}` : ""),
-        printed ? `${printed[1]} %` : null, others.map((g) => `${g.policy}: ${Format.percent(Summary.rate(g.episodes).value)} %`)));
-      if (own.time !== null && own.time !== undefined) {
-        cards.push(Summary.card(`${own.task}: seconds on the robot, median`, Format.number(own.time), "s", "simulated, from the start pose to the verdict", printed ? `${printed[2]} s` : null,
-          others.map((g) => ({ g, t: Summary.time(g.episodes) })).filter((o) => o.t !== null).map((o) => `${o.g.policy}: ${Format.number(o.t)} s`)));
-      }
-    }
-    return cards;
+      return cards;
+    });
   },
 
   solverCards(data) {
     const cards = [];
     const table = Summary.find(data, "table1-plug") || Summary.find(data, "table4-pipe");
     if (table) {
-      const row = table.rows.find((r) => String(r[0]).startsWith("e-rtdp-bel 2")), c = Summary.column(table, /^relative_speedup_cpu$/), p = Summary.column(table, /^printed_relative_speedup$/);
-      const s = Summary.column(table, /^success_percent$/);
+      const at = (name) => table.columns.indexOf(name), c = at("relative_speedup_cpu"), p = at("printed_relative_speedup"), s = at("success_percent");
+      const row = table.rows.find((r) => String(r[0]).startsWith("e-rtdp-bel 2"));
       const certified = table.rows.find((r) => String(r[0]).startsWith("certified"));
       if (certified && typeof certified[s] === "number") {
         cards.push(Summary.card("problems solved, certified policies", Format.number(certified[s]), "%", `${table.name}, time limit 30 s of CPU`, row && p >= 0 ? "100 % (E-RTDP-Bel), 78.9 to 86.5 % (RTDP-Bel)" : null,
@@ -88,10 +87,11 @@ const Summary = {
   baselineCards(data) {
     const figure = Summary.find(data, "figure-tbl");
     if (!figure) return [];
-    const policy = Summary.column(figure, /^policy$/), cost = Summary.column(figure, /relative_cost|cost_ratio|relative.*cost/), size = Summary.column(figure, /hypotheses/);
+    const at = (name) => figure.columns.indexOf(name), policy = at("policy"), cost = at("relative_cost"), size = at("hypotheses");
     if (policy < 0 || cost < 0 || size < 0) return [];
-    const most = Math.max(...figure.rows.map((r) => r[size]).filter((v) => typeof v === "number"));
-    const rows = figure.rows.filter((r) => r[size] === most && typeof r[cost] === "number");
+    const kinds = figure.rows.filter((r) => typeof r[cost] === "number" && (at("cost") < 0 || r[at("cost")] === figure.rows[0][at("cost")]));
+    const most = Math.max(...kinds.filter((r) => String(r[policy]).startsWith("tbl")).map((r) => r[size]));
+    const rows = kinds.filter((r) => r[size] === most);
     const tbl = rows.find((r) => r[policy] === "tbl") || rows.find((r) => String(r[policy]).startsWith("tbl"));
     if (!tbl) return [];
     return [Summary.card(`cost of touch-based localization at ${most} hypotheses`, Format.number(tbl[cost]), "× ours", "figure-tbl", "grows with the number of hypotheses; no values printed",
@@ -99,7 +99,7 @@ const Summary = {
   },
 
   build(section, data) {
-    const groups = Summary.groups(data.records), episodes = data.records.reduce((n, r) => n + r.episodes.length, 0);
+    const groups = Summary.groups(data), episodes = data.records.reduce((n, r) => n + r.episodes.length, 0);
     const failed = data.records.reduce((n, r) => n + r.episodes.filter((e) => !e.inserted).length, 0);
     const cards = [...Summary.taskCards(data, groups), ...Summary.baselineCards(data), ...Summary.solverCards(data)];
     const parts = [];
@@ -110,7 +110,7 @@ const Summary = {
     if (cards.length) section.append(element("div", { class: "cards" }, cards));
     const policies = groups.filter((g) => g.episodes.length).map((g) => ({ label: `${g.task} · ${g.policy}${g.noise === "ideal" ? "" : " · " + g.noise}`, rate: Summary.rate(g.episodes) }));
     if (policies.length > 1) {
-      section.append(element("div", { class: "figures" }, Plots.dots("Inserted", "with 95 % intervals", policies.map((p) => ({ label: p.label, marks: [{ value: 100 * p.rate.value, low: 100 * p.rate.low, high: 100 * p.rate.high, color: "var(--accent)" }] })), { label: "%", from: 90, to: 100 })));
+      section.append(element("div", { class: "figures" }, Plots.dots("Inserted", "by task, policy and noise over the runs of the folder; 95 % intervals", policies.map((p) => ({ label: p.label, marks: [{ value: 100 * p.rate.value, low: 100 * p.rate.low, high: 100 * p.rate.high, color: "var(--accent)" }] })), { label: "%", from: 90, to: 100 })));
     }
   },
 };

@@ -6,24 +6,29 @@ const Tables = {
   plan(columns) {
     const at = new Map(columns.map((name, i) => [name, i]));
     const cells = columns.map((name, index) => ({ name, index, share: false }));
-    const owner = (name, words) => {
-      const base = name.replace(words, "_").replace(/^_|_$/g, "").replace(/__/g, "_");
+    const isBound = (name) => /(^|_)(low|high)(_|$)/.test(name) || name.startsWith("printed");
+    // "time_low_s" belongs to "time_s", else to the first column that begins and ends like it: "time_median_s".
+    const owner = (name) => {
+      const words = name.split("_").filter((w) => w !== "low" && w !== "high"), base = words.join("_");
       if (at.has(base)) return at.get(base);
-      for (const known of ["rate", "value"]) if (base === "" && at.has(known)) return at.get(known);
-      const prefixed = columns.findIndex((c) => base !== "" && c !== name && !/(^|_)(low|high)(_|$)|^printed/.test(c) && (c.startsWith(base + "_") || c === base + "_rate" || c === base + "_mean"));
-      return prefixed;
+      if (base === "") return ["rate", "value"].map((known) => at.get(known)).find((i) => i !== undefined) ?? -1;
+      const last = words.length > 1 ? words[words.length - 1] : null;
+      return columns.findIndex((c) => !isBound(c) && c.startsWith(words[0] + "_") && (last === null || c.endsWith("_" + last)));
     };
+    const printedAs = { success_percent: ["rate", 0.01], execution_time_s: ["time_median_s", 1] };
     const hidden = new Set();
     columns.forEach((name, index) => {
       const bound = /(^|_)(low|high)(_|$)/.exec(name);
       if (bound && !name.startsWith("printed")) {
-        const of = owner(name, /(^|_)(low|high)(_|$)/);
+        const of = owner(name);
         if (of >= 0) { cells[of][bound[2]] = index; hidden.add(index); }
       } else if (name.startsWith("printed_")) {
         const base = name.slice("printed_".length);
         let of = columns.findIndex((c) => c === base);
-        if (of < 0) of = columns.findIndex((c, i) => !c.startsWith("printed") && !hidden.has(i) && c.startsWith(base));
-        if (of >= 0 && cells[of].printed === undefined) { cells[of].printed = index; hidden.add(index); }
+        if (of < 0) of = columns.findIndex((c, i) => !isBound(c) && !hidden.has(i) && c.startsWith(base));
+        let scale = 1;
+        if (of < 0 && printedAs[base] && at.has(printedAs[base][0])) [of, scale] = [at.get(printedAs[base][0]), printedAs[base][1]];
+        if (of >= 0 && cells[of].printed === undefined) { Object.assign(cells[of], { printed: index, printedScale: scale }); hidden.add(index); }
       }
     });
     return cells.filter((c) => !hidden.has(c.index));
@@ -37,6 +42,12 @@ const Tables = {
       cell.share = values.length > 0 && values.every((v) => v >= 0 && v <= 1);
     }
     return plan;
+  },
+
+  /** What the paper prints for a cell, in the unit of the column. */
+  printed(cell, row) {
+    const value = row[cell.printed];
+    return typeof value === "number" ? value * cell.printedScale : value;
   },
 
   text(value, share) {
@@ -65,7 +76,7 @@ const Tables = {
         const interval = value !== null && typeof low === "number" && typeof high === "number";
         line.append(element("td", { class: cell.text ? "text" : null }, Tables.text(value, cell.share),
           interval ? element("span", { class: "interval" }, `[${Tables.text(low, cell.share)}, ${Tables.text(high, cell.share)}]`) : null));
-        if (cell.withPrinted) line.append(element("td", { class: "printed" }, row[cell.printed] === null ? "" : Tables.text(row[cell.printed], cell.share)));
+        if (cell.withPrinted) line.append(element("td", { class: "printed" }, row[cell.printed] === null ? "" : Tables.text(Tables.printed(cell, row), cell.share)));
       }
       body.append(line);
     }
