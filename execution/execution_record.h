@@ -54,6 +54,7 @@ struct ExecutionRecord {
   int attempts = 0;      ///< walks of a policy that were begun
   int hypotheses = 0;    ///< of the first of them
   int policy_moves = 0;  ///< guarded moves that the policy asked for (merged ones counted one by one)
+  int pictures = 0;      ///< that the policy looked at
   int contacts = 0;      ///< motions that ended at a contact before the insertion
   int grazes = 0;        ///< times an edge was met (or missed) by less than a cell and the lattice shifted
   bool fell_in = false;  ///< the tool slipped into the opening while it probed, and was localized from inside

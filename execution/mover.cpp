@@ -145,4 +145,37 @@ MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double
   return report;
 }
 
+MotionReport Mover::Follow(const TwistMotion& motion) {
+  CheckLimits();
+  TwistMotion watched = motion;
+  watched.contact_force_n = options_.contact_force_n;
+  const MotionResult result = robot_.FollowTwist(watched);
+  MotionReport report;
+  report.end = Measure(result.world_T_tool);
+  report.contact = result.contact || result.reason == StopReason::kContact;
+  report.reason = result.reason;
+  if (record_.moves.empty() || record_.moves.back().kind != "servo") {
+    record_.moves.emplace_back();
+    record_.moves.back().kind = "servo";
+  }
+  MoveRecord& move = record_.moves.back();
+  const double travelled_m = (report.end - position_).norm() * frame_.cell_m;
+  move.commanded_m += motion.linear_m_s.norm() * motion.duration_s;
+  move.travelled_m += travelled_m;
+  move.contact = report.contact;
+  if (std::isfinite(result.peak_force_n)) move.peak_force_n = std::max(move.peak_force_n, result.peak_force_n);
+  const double now_s = robot_.Time();
+  move.duration_s += now_s - last_motion_end_s_;
+  last_motion_end_s_ = now_s;
+  record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
+  record_.path_length_m += travelled_m;
+  position_ = report.end;
+  if (report.contact) ++record_.contacts;
+  if (result.reason == StopReason::kAborted || result.reason == StopReason::kUnplanned) {
+    throw ExecutionFailure(fmt::format("robot: servo motion {}{}{}", ToString(result.reason),
+                                       result.detail.empty() ? "" : ": ", result.detail));
+  }
+  return report;
+}
+
 }  // namespace feeler::execution

@@ -62,6 +62,11 @@ class Mover {
   MotionReport Insert(const Eigen::Vector3d& target);
   /// Compliantly through way points, pressing on what is under the tool.
   MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
+  /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".
+  MotionReport Follow(const TwistMotion& motion);
+  CameraView Look() { return robot_.Look(); }
+  /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
+  Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
   void ZeroWrench() { robot_.ZeroWrench(); }
 
  private:

@@ -1,0 +1,56 @@
+#include "execution/servoing.h"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <exception>
+#include <string>
+
+namespace feeler::execution {
+namespace {
+
+/// Pictures of one episode, whatever the policy.
+constexpr int kPictureLimit = 10000;
+constexpr double kStop_s = 0.1;
+
+double ThreadCpuSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace
+
+policies::Decision FollowByEye(const planner::Problem& problem, const policies::Decision& first,
+                               policies::Policy& policy, Mover& mover, ExecutionRecord& record) {
+  const policies::Belief belief{problem.start, problem.hypotheses};
+  policies::Decision decision = first;
+  TwistMotion stop;
+  while (const auto* servo = std::get_if<policies::Servo>(&decision)) {
+    if (record.pictures >= kPictureLimit) {
+      throw ExecutionFailure(fmt::format("limit: {} pictures without a verdict", record.pictures));
+    }
+    if (servo->motion.duration_s > 0.0) {
+      if (mover.Follow(servo->motion).contact) throw LostTrack("servo: the tool touches something");
+      stop.tool_T_frame = servo->motion.tool_T_frame;
+    }
+    const CameraView view = mover.Look();
+    ++record.pictures;
+    const double before = ThreadCpuSeconds();
+    try {
+      policy.See(view);
+      decision = policy.Next(belief);
+    } catch (const std::exception& error) {
+      throw ExecutionFailure(fmt::format("policy threw: {}", error.what()));
+    }
+    record.policy_cpu_s += ThreadCpuSeconds() - before;
+  }
+  if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
+    throw LostTrack("policy gave up: " + give_up->reason);
+  }
+  stop.duration_s = kStop_s;
+  mover.Follow(stop);
+  return decision;
+}
+
+}  // namespace feeler::execution
