@@ -47,7 +47,7 @@ double PolicyWalk::Predict(const Tracked& tracked, const GuardedMove& move) cons
       problem_.map->Travel(robot_ - tracked.hypothesis.offset, move.direction, tracked.hypothesis.orientation)};
 }
 
-policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt) {
+policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt, const std::function<bool()>& enough) {
   policy_.Begin(problem_);
   if (record_.attempts++ == 0) record_.hypotheses = static_cast<int>(problem_.hypotheses.size());
   while (true) {
@@ -99,6 +99,7 @@ policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt) {
     }
     if (reading.contact || std::abs(place[axis] - mover_.position()[axis]) > 0.3) mover_.Retreat(place);
     if ((mover_.position() - Station()).cwiseAbs().maxCoeff() > kFarOff) return {};
+    if (reading.contact && enough()) return {};
   }
 }
 

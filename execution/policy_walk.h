@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "execution/execution_record.h"
@@ -26,9 +27,10 @@ class PolicyWalk {
   /// All arguments outlive the walk. The tool stands at the start cell of the problem.
   PolicyWalk(const planner::Problem& problem, policies::Policy& policy, Mover& mover, ExecutionRecord& record);
 
-  /// Adds every motion to `felt`. What the policy wants at the end: to insert with or without confirming touches; with,
-  /// where tool and policy parted before a leaf. Throws ExecutionFailure if it wants what needs a known orientation.
-  policies::Insert Run(std::vector<FeltMotion>& felt);
+  /// Adds every motion to `felt`; asks `enough` after every contact whether the walk may end early. What the policy
+  /// wants at the end: to insert with or without confirming touches; with, where tool and policy parted before a leaf.
+  /// Throws ExecutionFailure if it wants what needs a known orientation.
+  policies::Insert Run(std::vector<FeltMotion>& felt, const std::function<bool()>& enough);
 
   /// Weighted mean of the hypotheses left: `pose_of` turns one into a PoseVector.
   template <class PoseOf>

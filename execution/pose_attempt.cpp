@@ -33,6 +33,8 @@ constexpr double kKnown_m = 3e-4;     ///< standard deviation of the position ac
 constexpr double kKnown_rad = 0.008;  ///< of the tilt
 /// Other fits whose cost is up to this above the best one's are possible still.
 constexpr double kRivals = 40.0;
+constexpr int kLeastContacts = 4;  ///< before a walk of the policy can end early
+constexpr double kRoughly = 3.0;
 constexpr int kSamples = 12;  ///< of the poses that a fit leaves
 constexpr double kStandoff_m = 0.012;
 constexpr double kNearStandoff_m = 0.003;
@@ -70,7 +72,7 @@ class PoseAttempt {
     }
     mover_.ZeroWrench();
     PolicyWalk walk(problem_, policy_, mover_, episode_.record);
-    const policies::Insert insert = walk.Run(felt_);
+    const policies::Insert insert = walk.Run(felt_, [&] { return IsRoughlyKnown(); });
     if (!insert.confirm) {
       // Open loop: at the middle of the hypotheses left.
       episode_.record.world_T_estimate =
@@ -218,6 +220,14 @@ class PoseAttempt {
     }
     knowledge.lateral_m = std::sqrt(lateral / weight);
     knowledge.tilt_rad = std::sqrt(tilt / weight);
+  }
+
+  /// The continuous readings may tell the pose before the policy, which is told rounded ones, knows a hypothesis.
+  bool IsRoughlyKnown() {
+    const auto contacts = std::count_if(felt_.begin(), felt_.end(), [](const FeltMotion& f) { return f.contact; });
+    if (contacts < kLeastContacts) return false;
+    const Knowledge knowledge = Know({});
+    return knowledge.lateral_m < kRoughly * kKnown_m && knowledge.tilt_rad < kRoughly * kKnown_rad;
   }
 
   /// Touches until the pose is known.

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "evaluation/experiments/acceptance_closed_loop.h"
+#include "evaluation/experiments/acceptance_contact_maps.h"
 #include "evaluation/experiments/acceptance_guarded_moves.h"
 #include "evaluation/experiments/acceptance_transfers.h"
 #include "evaluation/experiments/bounds.h"
@@ -20,6 +21,8 @@ const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> kExperiments = {
       {kAcceptanceClosedLoopName, "episodes in physics at full size, with and without fallbacks, under every noise",
        RunAcceptanceClosedLoop},
+      {kAcceptanceContactMapsName, "contact maps over orientation: time of the build, agreement with MuJoCo",
+       RunAcceptanceContactMaps},
       {kAcceptanceGuardedMovesName, "guarded moves in physics against geometry", RunAcceptanceGuardedMoves},
       {kAcceptanceTransfersName, "transfers among obstacles in four scenes: planned, and carried out in physics",
        RunAcceptanceTransfers},
