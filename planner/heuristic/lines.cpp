@@ -23,19 +23,28 @@ std::array<Cell, 6> UnitNeighbours() {
 
 }  // namespace
 
-LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread) {
+LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread, const Cell& longest,
+                     const std::vector<int>& orientations)
+    : place_(static_cast<std::size_t>(map.orientations()), -1) {
+  for (std::size_t i = 0; i < orientations.size(); ++i)
+    place_[static_cast<std::size_t>(orientations[i])] = static_cast<int>(i);
   const std::uint32_t free_units = costs.contact > 0.0 ? kUnitsPerStep : 1;
   unit_ = costs.free / free_units;
   const auto contact_units = static_cast<std::uint32_t>(std::min(4000.0, std::floor(costs.contact / unit_)));
   for (int axis = 0; axis < 3; ++axis) {
     Grid& grid = grids_[static_cast<std::size_t>(axis)];
+    grid.longest = std::min(longest[axis], kLongest);
+    if (grid.longest < 2) {
+      grid.longest = 1;
+      continue;
+    }
     // Far enough out that the whole line has left the map's domain: beyond, everything repeats.
     grid.domain = {map.domain().min - Cell::Constant(kBorder), map.domain().max + Cell::Constant(kBorder)};
-    grid.domain.max[axis] += kLongest;
+    grid.domain.max[axis] += grid.longest;
     grid.size = grid.domain.Size();
     grid.cells = static_cast<std::size_t>(grid.domain.Count());
-    grid.values.assign(grid.cells * (kLongest + 1) * static_cast<std::size_t>(map.orientations()), 0);
-    for (int o = 0; o < map.orientations(); ++o) Fill(map, axis, o, spread[axis], free_units, contact_units);
+    grid.values.assign(grid.cells * static_cast<std::size_t>(grid.longest + 1) * orientations.size(), 0);
+    for (const int o : orientations) Fill(map, axis, o, spread[axis], free_units, contact_units);
   }
 }
 
@@ -72,7 +81,8 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
     }
   }
 
-  std::uint16_t* const planes = &grid.values[static_cast<std::size_t>(orientation * (kLongest + 1)) * grid.cells];
+  const int place = place_[static_cast<std::size_t>(orientation)];
+  std::uint16_t* const planes = &grid.values[static_cast<std::size_t>(place * (grid.longest + 1)) * grid.cells];
   const auto runs_value = [&](std::uint32_t bits, std::size_t at) {
     std::uint32_t sum = 0;
     for (int i = 0; bits >> i != 0;) {
@@ -95,7 +105,7 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
   std::vector<std::uint32_t> cost(grid.cells);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> seeds;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> queue;
-  for (int length = 2; length <= kLongest; ++length) {
+  for (int length = 2; length <= grid.longest; ++length) {
     std::uint16_t* const plane = planes + static_cast<std::size_t>(length) * grid.cells;
     if (length <= spread + 1) continue;  // a goal
     const auto whole = static_cast<std::uint32_t>((std::uint32_t{1} << length) - 1);
@@ -154,7 +164,15 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
 
 LineHeuristic::LineHeuristic(const HypothesisSets& sets, std::shared_ptr<const LineTable> table,
                              std::shared_ptr<const PairCertificates> pairs)
-    : sets_(sets), table_(std::move(table)), isolated_(sets, std::move(pairs), UnitNeighbours()) {}
+    : sets_(sets), table_(std::move(table)) {
+  isolated_.emplace(sets, std::move(pairs), UnitNeighbours());
+}
+
+LineHeuristic::LineHeuristic(const Problem& problem, const HypothesisSets& sets, std::shared_ptr<const LineTable> table,
+                             std::shared_ptr<const OrientedPairs> oriented_pairs)
+    : sets_(sets),
+      table_(std::move(table)),
+      oriented_isolated_(std::make_unique<OrientedHeuristic>(problem, sets, std::move(oriented_pairs))) {}
 
 const LineHeuristic::Runs& LineHeuristic::Prepare(SetId set) {
   if (set >= runs_of_.size()) runs_of_.resize(sets_.count());
@@ -173,8 +191,8 @@ const LineHeuristic::Runs& LineHeuristic::Prepare(SetId set) {
     for (std::size_t i = 0; i < members.size(); ++i) {
       const auto& [h, o] = members[i];
       Run* const last = i > 0 ? &runs_.back() : nullptr;
-      if (last != nullptr && last->orientation == o && last->length < LineTable::kLongest && last->first[u] == h[u] &&
-          last->first[v] == h[v] && last->first[axis] + last->length == h[axis]) {
+      if (last != nullptr && last->orientation == o && last->length < std::max(1, table_->longest(axis)) &&
+          last->first[u] == h[u] && last->first[v] == h[v] && last->first[axis] + last->length == h[axis]) {
         ++last->length;
       } else {
         runs_.push_back({h, 1, o});
@@ -199,7 +217,8 @@ double LineHeuristic::Weighted(SetId set, const Cell& robot) {
     }
     best = std::max(best, sum);
   }
-  return best * table_->unit() + isolated_.Weighted(set, robot);
+  return best * table_->unit() +
+         (isolated_ ? isolated_->Weighted(set, robot) : oriented_isolated_->Weighted(set, robot));
 }
 
 }  // namespace feeler::planner

@@ -14,9 +14,14 @@ OrientedHeuristic::OrientedHeuristic(const Problem& problem, const HypothesisSet
     : sets_(sets),
       table_(std::move(table)),
       pairs_(std::move(pairs)),
+      unit_(pairs_->unit()),
       spread_(problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero())),
       pitches_(problem.pitches),
       uniform_(sets.uniform()) {}
+
+OrientedHeuristic::OrientedHeuristic(const Problem& problem, const HypothesisSets& sets,
+                                     std::shared_ptr<const OrientedPairs> pairs)
+    : OrientedHeuristic(problem, sets, nullptr, std::move(pairs)) {}
 
 void OrientedHeuristic::FindMembers(SetId set) {
   members_.clear();
@@ -26,7 +31,14 @@ void OrientedHeuristic::FindMembers(SetId set) {
     const Cell corner = sets_.Corner(slab.layer);
     // Per neighbour, the members of the slab that have it: the neighbour's slabs, moved onto this one.
     std::array<Bits256, OrientedCertificates::kMostNeighbours> with{};
-    for (std::size_t i = 0; table_->Tabled(orientation) && i < table_->neighbours().size(); ++i) {
+    for (std::size_t i = 0; table_ == nullptr && i < kDirectionCount; ++i) {
+      for (const Slab& theirs : slabs) {
+        if (sets_.Orientation(theirs.layer) != orientation) continue;
+        with[i] = with[i] | MembersWithNeighbour(slab.bits, corner, theirs.bits, sets_.Corner(theirs.layer),
+                                                 UnitCell(kDirections[i]));
+      }
+    }
+    for (std::size_t i = 0; table_ != nullptr && table_->Tabled(orientation) && i < table_->neighbours().size(); ++i) {
       const int other = table_->NeighbourOf(orientation, i);
       if (other < 0) continue;
       const Cell& by = table_->neighbours()[i].offset;
@@ -73,6 +85,8 @@ OrientedHeuristic::Terms OrientedHeuristic::Prepare(SetId set) {
       const OrientedPairs::Plane& plane =
           pairs_->Get(members_[*nearest].offset - member.offset, member.orientation, members_[*nearest].orientation);
       runs_.push_back({plane.values.data(), &plane.box, member.offset, 1});
+    } else if (table_ == nullptr) {
+      continue;
     } else {
       const std::uint8_t* const values = table_->Plane(member.orientation, member.neighbours);
       Run* const last = runs_.size() > terms.first ? &runs_.back() : nullptr;
@@ -120,7 +134,7 @@ double OrientedHeuristic::Weighted(SetId set, const Cell& robot) {
       weighted += weights_[i] * static_cast<double>(of_run);
     }
   }
-  return (uniform_ ? static_cast<double>(sum) : weighted) * table_->unit();
+  return (uniform_ ? static_cast<double>(sum) : weighted) * unit_;
 }
 
 }  // namespace feeler::planner

@@ -19,6 +19,9 @@ class OrientedHeuristic final : public BeliefHeuristic {
  public:
   OrientedHeuristic(const Problem& problem, const HypothesisSets& sets,
                     std::shared_ptr<const OrientedCertificates> table, std::shared_ptr<const OrientedPairs> pairs);
+  /// Only the part of hypotheses that are isolated in position: those without a neighbour a cell away of their own
+  /// orientation. To be added to bounds that count nothing for them.
+  OrientedHeuristic(const Problem& problem, const HypothesisSets& sets, std::shared_ptr<const OrientedPairs> pairs);
   double Weighted(SetId set, const Cell& robot) override;
   std::size_t bytes() const override {
     return terms_of_.capacity() * sizeof(Terms) + runs_.capacity() * sizeof(Run) + weights_.capacity() * sizeof(double);
@@ -48,8 +51,9 @@ class OrientedHeuristic final : public BeliefHeuristic {
   std::optional<std::size_t> Nearest(std::size_t member) const;
 
   const HypothesisSets& sets_;
-  std::shared_ptr<const OrientedCertificates> table_;
+  std::shared_ptr<const OrientedCertificates> table_;  ///< null: isolated ones only
   std::shared_ptr<const OrientedPairs> pairs_;
+  double unit_;
   Cell spread_;
   int pitches_;
   bool uniform_;

@@ -8,6 +8,7 @@ namespace feeler::planner {
 
 OrientedPairs::OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs)
     : flags_(std::move(flags)),
+      unit_(costs.free),
       contact_units_(static_cast<std::uint8_t>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)))) {}
 
 const OrientedPairs::Plane& OrientedPairs::Get(const Cell& offset, int orientation, int other) const {

@@ -24,12 +24,15 @@ class OrientedPairs {
 
   OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs);
 
+  /// Cost in problem units of a unit of the tables.
+  double unit() const { return unit_; }
   const Plane& Get(const Cell& offset, int orientation, int other) const;
 
  private:
   Plane Build(const Cell& offset, int orientation, int other) const;
 
   std::shared_ptr<const StepFlagsGrid> flags_;
+  double unit_;
   std::uint8_t contact_units_ = 0;
   mutable std::mutex mutex_;
   mutable std::map<std::array<int, 5>, std::unique_ptr<const Plane>> planes_;

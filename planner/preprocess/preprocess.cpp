@@ -22,19 +22,6 @@ constexpr std::size_t kLookAhead = 256;
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
 constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
 
-/// The largest extents along each axis.
-Extents LargestExtents(const ProblemFamily& family) {
-  Extents largest;
-  for (const Extents& extents : family.problems) {
-    largest.nx = std::max(largest.nx, extents.nx);
-    largest.ny = std::max(largest.ny, extents.ny);
-    largest.nz = std::max(largest.nz, extents.nz);
-    largest.n_yaw = std::max(largest.n_yaw, extents.n_yaw);
-    largest.n_pitch = std::max(largest.n_pitch, extents.n_pitch);
-  }
-  return largest;
-}
-
 class Framework {
  public:
   Framework(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,

@@ -220,6 +220,18 @@ ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string sp
   return all;
 }
 
+Extents LargestExtents(const ProblemFamily& family) {
+  Extents largest;
+  for (const Extents& extents : family.problems) {
+    largest.nx = std::max(largest.nx, extents.nx);
+    largest.ny = std::max(largest.ny, extents.ny);
+    largest.nz = std::max(largest.nz, extents.nz);
+    largest.n_yaw = std::max(largest.n_yaw, extents.n_yaw);
+    largest.n_pitch = std::max(largest.n_pitch, extents.n_pitch);
+  }
+  return largest;
+}
+
 ProblemFamily FamilyOf(const Task& task) {
   Ranges ranges = kOneEach;
   std::string spec;

@@ -63,6 +63,8 @@ ProblemFamily ParseProblemFamily(std::string_view spec);
 ProblemFamily ParseProblemFamily(std::string_view spec, const Task& task);
 /// The problems of all the families, each once, in lexicographic order. `spec` is kept as it is.
 ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string spec);
+/// The largest extents along each axis (of no problem together, perhaps): tables for it serve the whole family.
+Extents LargestExtents(const ProblemFamily& family);
 /// The family the task file gives by the ranges of its axes (an axis that is not uncertain has extent 1).
 ProblemFamily FamilyOf(const Task& task);
 

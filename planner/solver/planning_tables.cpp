@@ -1,6 +1,8 @@
 #include "planner/solver/planning_tables.h"
 
+#include <algorithm>
 #include <numeric>
+#include <vector>
 
 #include "planner/contact/fill_dead_ends.h"
 #include "planner/heuristic/certificate.h"
@@ -22,6 +24,14 @@ Cell ExtentsOf(const Problem& problem) {
     high = high.cwiseMax(h.offset);
   }
   return high - low + Cell::Ones();
+}
+
+std::vector<int> OrientationsOf(const Problem& problem) {
+  std::vector<int> orientations;
+  for (const Hypothesis& h : problem.hypotheses) orientations.push_back(h.orientation);
+  std::ranges::sort(orientations);
+  orientations.erase(std::unique(orientations.begin(), orientations.end()), orientations.end());
+  return orientations;
 }
 
 }  // namespace
@@ -60,7 +70,12 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
           motions.start > 0.0 ? CertificateTable(*problem.map, costs, SpreadOf(problem)) : *certificate_, costs,
           SpreadOf(problem), ExtentsOf(problem), jobs);
       break;
-    case HeuristicKind::kLines: lines_ = std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem)); break;
+    case HeuristicKind::kLines:
+      lines_ = oriented ? std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem), ExtentsOf(problem),
+                                                      OrientationsOf(problem))
+                        : std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
+                                                      Cell::Constant(LineTable::kLongest), std::vector<int>{0});
+      break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
   if (options.solver == SolverKind::kCertified && problem.generous_workspace) filled();
@@ -70,6 +85,7 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& pr
                                                                const HypothesisSets& sets) const {
   if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_);
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
+  if (lines_ && oriented_pairs_) return std::make_unique<LineHeuristic>(problem, sets, lines_, oriented_pairs_);
   if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
   if (cuboids_) return std::make_unique<CuboidHeuristic>(sets, cuboids_, certificate_, pairs_);

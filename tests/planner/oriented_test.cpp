@@ -1,0 +1,179 @@
+// Problems whose hypotheses differ in orientation too. Oracle: value iteration over all reachable beliefs of small
+// random problems of two to four orientations. Laws: heuristics are admissible, consistent and zero at goals; the
+// certified solver and RTDP-Bel keep their promises; hypotheses that differ in nothing but an orientation that cannot
+// be felt are reported; canonical translation is exact; the table over orientations agrees with the table for one; the
+// heuristic of canonical beliefs is that of the same beliefs in problem coordinates.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/error.h"
+#include "planner/belief/belief_graph.h"
+#include "planner/heuristic/certificate_table.h"
+#include "planner/preprocess/problem_family.h"
+#include "planner/solver/evaluate.h"
+#include "planner/solver/planning_tables.h"
+#include "tests/planner/oriented_problems.h"
+#include "tests/planner/synthetic_pipe.h"
+#include "tests/planner/synthetic_plug.h"
+
+namespace feeler::planner {
+namespace {
+
+using testing::OrientedProblem;
+using testing::RandomProblemOptions;
+using testing::ValueIteration;
+
+class OrientedHeuristics : public ::testing::TestWithParam<std::tuple<HeuristicKind, int>> {};
+
+TEST_P(OrientedHeuristics, AdmissibleAndConsistent) {
+  const auto [heuristic_kind, kind] = GetParam();
+  RandomProblemOptions options;
+  options.three_d = (kind & 1) != 0;
+  options.weights = (kind & 2) != 0;
+  options.costs = (kind & 4) != 0;
+  options.insertable = (kind & 8) != 0;
+  double sum_of_ratios = 0.0;
+  int beliefs = 0;
+  for (std::uint64_t index = 0; index < 10; ++index) {
+    const auto [orientations, pitches] = std::vector<std::pair<int, int>>{{2, 1}, {2, 2}, {3, 1}, {4, 2}}[index % 4];
+    const Problem problem =
+        OrientedProblem(300 + static_cast<std::uint64_t>(kind), index, options, orientations, pitches);
+    SCOPED_TRACE(problem.name);
+    const ValueIteration oracle(problem);
+    if (!oracle.complete()) continue;
+    SolverOptions solver;
+    solver.heuristic = heuristic_kind;
+    const PlanningTables tables(problem, solver, Parallelism(2));
+    HypothesisSets sets(problem, false);
+    const auto heuristic = tables.MakeHeuristic(problem, sets);
+    std::vector<double> values;
+    for (std::size_t b = 0; b < oracle.beliefs().size(); ++b) {
+      const auto set = sets.Find(oracle.Hypotheses(b));
+      ASSERT_TRUE(set.has_value());
+      const auto& robot = oracle.beliefs()[b].robot;
+      values.push_back(heuristic->Weighted(*set, Cell(robot[0], robot[1], robot[2])) / sets.info(*set).weight);
+      ASSERT_LE(values.back(), oracle.values()[b] + 1e-9);
+      if (oracle.Goal(b)) {
+        EXPECT_EQ(values.back(), 0.0);
+      } else if (std::isfinite(oracle.values()[b])) {
+        sum_of_ratios += values.back() / oracle.values()[b];
+        ++beliefs;
+      }
+    }
+    for (std::size_t b = 0; b < values.size(); ++b) {
+      for (const ValueIteration::Action& action : oracle.actions()[b]) {
+        ASSERT_LE(values[b], ValueIteration::Q(action, values) + 1e-9);
+      }
+    }
+  }
+  EXPECT_GT(beliefs, 20);
+  RecordProperty("mean_tightness", std::to_string(sum_of_ratios / beliefs));
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, OrientedHeuristics,
+                         ::testing::Combine(::testing::Values(HeuristicKind::kCertificate, HeuristicKind::kLines,
+                                                              HeuristicKind::kFirstContact),
+                                            ::testing::Range(0, 16)));
+
+TEST(Oriented, SolversKeepTheirPromises) {
+  int solved = 0;
+  for (std::uint64_t index = 0; index < 80; ++index) {
+    const Problem problem = OrientedProblem(77, index, {.three_d = index % 2 == 1, .weights = index % 3 == 0},
+                                            2 + static_cast<int>(index % 3), 1 + static_cast<int>(index % 2));
+    const ValueIteration oracle(problem);
+    if (!oracle.complete()) continue;
+    const double optimum = oracle.values().front();
+    for (const double epsilon : {1.0, 2.0}) {
+      SolverOptions options;
+      options.gap = epsilon;
+      options.epsilon = epsilon;
+      for (const SolverKind kind : {SolverKind::kCertified, SolverKind::kRtdpBel}) {
+        options.solver = kind;
+        const SolverResult result = Solve(problem, options);
+        if (!std::isfinite(optimum)) {
+          EXPECT_EQ(result.status, SolverStatus::kUnlocalizable);
+          EXPECT_FALSE(result.indistinguishable.empty());
+          continue;
+        }
+        ASSERT_TRUE(result.complete());
+        EXPECT_EQ(Evaluate(problem, *result.policy).fault, "");
+        EXPECT_GE(result.expected_cost, optimum - 1e-7);
+        EXPECT_LE(result.expected_cost, epsilon * optimum + 1e-7);
+        EXPECT_LE(result.lower_bound, optimum + 1e-7);
+        ++solved;
+      }
+    }
+  }
+  EXPECT_GT(solved, 20);
+}
+
+TEST(Oriented, AnglesThatCannotBeFeltAreReported) {
+  // A plug's map in two equal layers.
+  const auto plug = testing::MakePlugMap(false, {4, 3, 3});
+  const auto map = std::make_shared<ContactMap>(
+      plug->domain(), std::vector<ContactMap::Layer>{plug->layer(0), plug->layer(0)}, plug->phase(), 0.5);
+  Task task = testing::MakePlugTask();
+  task.axes.push_back({AxisKind::kYaw, 0.05, 2, 2});
+  const Problem problem = MakeCuboidProblem(task, map, {2, 1, 1, 2, 1});
+  for (const SolverKind kind : {SolverKind::kCertified}) {
+    SolverOptions options;
+    options.solver = kind;
+    const SolverResult result = Solve(problem, options);
+    EXPECT_EQ(result.status, SolverStatus::kUnlocalizable);
+    EXPECT_EQ(result.indistinguishable, (std::vector<std::pair<int, int>>{{0, 1}, {2, 3}}));
+  }
+  EXPECT_TRUE(Solve(MakeCuboidProblem(task, map, {2, 2, 1, 1, 1}), SolverOptions()).complete());
+}
+
+TEST(Oriented, CanonicalTranslationIsExact) {
+  const Task task = [] {
+    Task small = testing::MakePipeTask(4, 2);
+    small.start_offset_m = Eigen::Vector3d(0.004, 0.0, 0.008);
+    small.workspace_m = Eigen::Vector3d(0.06, 0.05, 0.03);
+    return small;
+  }();
+  const auto map = testing::MakePipeMap(task, 0.35);
+  for (const Extents& extents : {Extents{2, 2, 1, 2, 2}, Extents{3, 1, 1, 1, 2}}) {
+    const Problem problem = MakeCuboidProblem(task, map, extents);
+    SolverOptions options;
+    options.gap = 1.0;
+    const SolverResult canonical = Solve(problem, options);
+    options.canonical_translation = false;
+    const SolverResult plain = Solve(problem, options);
+    ASSERT_TRUE(canonical.complete());
+    ASSERT_TRUE(plain.complete());
+    EXPECT_NEAR(canonical.expected_cost, plain.expected_cost, 1e-7);
+    EXPECT_EQ(Evaluate(problem, *canonical.policy).fault, "");
+  }
+}
+
+TEST(Oriented, TheTableAgreesWithTheOneForOneOrientation) {
+  const auto map = testing::MakePlugMap(false, {5, 4, 3});
+  const Task task = testing::MakePlugTask();
+  Problem problem = MakeCuboidProblem(task, map, {3, 3, 3});
+  const StepCosts costs = LowerStepCosts(task.cost, 16);
+  const CertificateTable one(*map, costs, Cell::Zero());
+  const StepFlagsGrid flags(*map, Parallelism(1));
+  const OrientedCertificates table(problem, flags, costs, Parallelism(1), {});
+  ASSERT_EQ(table.neighbours().size(), 6U);
+  RandomStream random(5, 0, "displacements");
+  const CellBox& domain = map->domain();
+  for (int i = 0; i < 20000; ++i) {
+    Cell at;
+    for (int axis = 0; axis < 3; ++axis) {
+      at[axis] =
+          domain.min[axis] - 3 + static_cast<int>(random.Index(static_cast<std::uint64_t>(domain.Size()[axis] + 6)));
+    }
+    if (map->Blocked(at)) continue;
+    const auto mask = static_cast<int>(random.Index(64));
+    const OrientedBox& box = table.box(0);
+    const std::uint8_t value = table.Plane(0, static_cast<unsigned>(mask))[box.Index(at)];
+    const std::uint32_t with_way = value + (mask == 0 ? 0 : box.WayBack(at));
+    ASSERT_EQ(with_way, one.Further(at, mask, 0)) << at.transpose() << " mask " << mask;
+  }
+}
+
+}  // namespace
+}  // namespace feeler::planner
