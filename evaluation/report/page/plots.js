@@ -20,8 +20,7 @@ const Plots = {
       svg.attr("viewBox", `0 0 ${width} ${height}`);
       Plots.drawn += 1;
     };
-    new ResizeObserver(redraw).observe(holder);
-    figure.redraw = redraw;
+    new ResizeObserver(() => requestAnimationFrame(redraw)).observe(holder);
     return figure;
   },
 

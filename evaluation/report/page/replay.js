@@ -54,7 +54,7 @@ class Player {
     this.timeline.addEventListener("pointerdown", (event) => { if (!this.replay) return; this.timeline.setPointerCapture(event.pointerId); this.dragging = true; this.pause(); seek(event); });
     this.timeline.addEventListener("pointermove", (event) => { if (this.dragging) seek(event); });
     this.timeline.addEventListener("pointerup", () => { this.dragging = false; });
-    new ResizeObserver(() => this.drawTimeline()).observe(this.timeline);
+    new ResizeObserver(() => requestAnimationFrame(() => this.drawTimeline())).observe(this.timeline);
     this.fillEpisodes();
   }
 
@@ -217,7 +217,7 @@ class Player {
     let before = performance.now();
     const tick = (now) => {
       if (!this.playing) return;
-      const passed = Math.min(0.1, Math.max(0, (now - before) / 1e3));
+      const passed = Math.min(0.25, Math.max(0, (now - before) / 1e3));
       before = now;
       this.seek(this.time + passed * this.speed);
       if (this.time >= this.replay.end) this.pause(); else requestAnimationFrame(tick);

@@ -164,7 +164,7 @@ class Scene3D {
     geometry.setAttribute("alive", new THREE.Float32BufferAttribute(alphas, 1));
     this.cloud = new THREE.Points(geometry, new THREE.ShaderMaterial({
       transparent: true, depthTest: false, depthWrite: false,
-      uniforms: { pixels: { value: 600 }, size: { value: 0.00042 * (turns > 1 ? 1.4 : 1) }, crowd: { value: 1 } },
+      uniforms: { pixels: { value: 600 }, size: { value: 0.0005 }, crowd: { value: 1 } },
       vertexShader: "attribute float alive; varying float a; uniform float pixels; uniform float size; void main() { a = alive; vec4 p = modelViewMatrix * vec4(position, 1.0);"
         + " gl_PointSize = clamp(pixels * size * (1.0 + 1.2 * alive) * projectionMatrix[1][1] / -p.z, 1.2, 60.0); gl_Position = projectionMatrix * p; }",
       fragmentShader: "varying float a; uniform float crowd; void main() { float r = length(gl_PointCoord - 0.5) * 2.0; if (r > 1.0 || a < 0.01) discard;"
@@ -223,6 +223,7 @@ class Scene3D {
     }
     alive.needsUpdate = true;
     this.cloud.material.uniforms.crowd.value = left > 1500 ? 0.45 : left > 300 ? 0.62 : left > 40 ? 0.8 : 1;
+    this.cloud.material.uniforms.size.value = left > 300 ? 0.0005 : left > 30 ? 0.0006 : left > 4 ? 0.0008 : 0.0011;
     this.showTouches(replay, time);
   }
 

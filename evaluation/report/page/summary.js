@@ -23,7 +23,7 @@ const Summary = {
   card(what, value, unit, interval, paper, baseline) {
     return element("div", { class: "card" }, element("div", { class: "what" }, what), element("div", { class: "value" }, value, unit ? element("small", {}, " " + unit) : null),
       element("div", { class: "interval" }, interval || "\u00a0"), paper ? element("div", { class: "paper" }, "the paper: ", element("b", {}, paper)) : null,
-      (baseline || []).map((text) => element("div", { class: "baseline" }, text)));
+      baseline && baseline.length ? element("div", { class: "baseline" }, "others" + (baseline.note || ""), element("ul", {}, baseline.map((text) => element("li", {}, text)))) : null);
   },
 
   percentText(rate) { return `95 % interval ${Format.percent(rate.low)} to ${Format.percent(rate.high)}, ${rate.successes} of ${rate.trials}`; },
@@ -35,7 +35,7 @@ const Summary = {
       const at = (name) => table.columns.indexOf(name), rows = table.rows.filter((r) => r[at("task")] === task);
       const widest = Math.max(...rows.map((r) => r[at("uncertainty_mm")]));
       return rows.filter((r) => r[at("uncertainty_mm")] === widest && !String(r[at("policy")]).startsWith("database"))
-        .map((r) => ({ policy: r[at("policy")], rate: r[at("rate")], time: r[at("inserted")] > 0 ? r[at("time_median_s")] : null, note: ` (±${Format.number(widest / 2)} mm)` }));
+        .map((r) => ({ policy: r[at("policy")], rate: r[at("rate")], time: r[at("inserted")] > 0 ? r[at("time_median_s")] : null, note: `, baselines at ±${Format.number(widest / 2)} mm` }));
     }
     return groups.filter((g) => g.task === task && g.policy !== "database" && g.noise === "ideal").map((g) => ({ policy: g.policy, rate: Summary.rate(g.episodes).value, time: Summary.time(g.episodes), note: "" }));
   },
@@ -57,12 +57,13 @@ const Summary = {
 
   taskCards(data, groups) {
     return Summary.ours(data, groups).flatMap((own) => {
-      const printed = Summary.printedTask(data, own.task), others = Summary.others(data, groups, own.task).slice(0, 8), sort = (list, by) => [...list].sort(by);
+      const printed = Summary.printedTask(data, own.task), others = Summary.others(data, groups, own.task).slice(0, 8), sort = (values, by) => [...values].sort(by);
+      const list = (values, text) => Object.assign(values.map(text), { note: values.length ? values[0].note : "" });
       const cards = [Summary.card(`${own.task}: inserted`, Format.percent(own.value), "%", `95 % interval ${Format.percent(own.low)} to ${Format.percent(own.high)} · ${own.note}`,
-        printed ? `${printed[1]} %` : null, sort(others, (a, b) => b.rate - a.rate).map((o) => `${o.policy}${o.note}: ${Format.percent(o.rate)} %`))];
+        printed ? `${printed[1]} %` : null, list(sort(others, (a, b) => b.rate - a.rate), (o) => `${o.policy}: ${Format.percent(o.rate)} %`))];
       if (own.time !== null) {
         cards.push(Summary.card(`${own.task}: time on the robot`, Format.number(own.time), "s", "median of inserted, start pose to verdict, simulated", printed ? `${printed[2]} s` : null,
-          sort(others.filter((o) => o.time !== null), (a, b) => a.time - b.time).map((o) => `${o.policy}${o.note}: ${Format.number(o.time)} s`)));
+          list(sort(others.filter((o) => o.time !== null), (a, b) => a.time - b.time), (o) => `${o.policy}: ${Format.number(o.time)} s`)));
       }
       return cards;
     });
