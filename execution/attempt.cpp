@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
+#include <variant>
 
 #include "core/orientation_lattice.h"
 #include "execution/insertion.h"
 #include "execution/localizer.h"
+#include "execution/servoing.h"
+#include "execution/spiral_search.h"
 
 namespace feeler::execution {
 namespace {
@@ -55,15 +59,42 @@ Eigen::Vector3d Mean(const std::vector<TrackedHypothesis>& tracked) {
   return sum / weight;
 }
 
+/// Spirals around the middle of the hypotheses left, and inserts where the tool drops in.
+void SearchAndInsert(const Episode& episode, const policies::SpiralSearch& search, Mover& mover, Attempt& attempt) {
+  const Task& task = episode.task;
+  ExecutionRecord& record = episode.record;
+  for (const double value : {search.radius_m, search.pitch_m, search.speed_m_s, search.press_n, search.face_range_m}) {
+    if (!(std::isfinite(value) && value > 0.0)) throw ExecutionFailure("policy: a spiral that is no sensible number");
+  }
+  if (search.radius_m > 1.0 || search.radius_m / search.pitch_m > 1e4) {
+    throw ExecutionFailure("policy: a spiral without an end");
+  }
+  const auto found = FindBySpiral(task, *attempt.target, search, mover);
+  record.localization_time_s = episode.robot.Time() - episode.started_s;
+  if (!found) {
+    attempt.end = AttemptEnd::kLost;
+    attempt.reason = "spiral: no opening found";
+    return;
+  }
+  attempt.target = found->target;
+  record.localized = true;
+  record.world_T_estimate = attempt.frame.ToWorld(found->target);
+  const InsertionVerdict verdict =
+      found->at_bottom ? InsertionVerdict{true, false, "inserted"} : InsertFromHere(task, found->target, mover);
+  record.inserted = verdict.inserted;
+  attempt.reason = verdict.reason;
+  attempt.end = verdict.inserted ? AttemptEnd::kInserted : AttemptEnd::kBlocked;
+}
+
 /// Fills the attempt step by step, so that what was reached stands in it after a failure.
 void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
                        Attempt& attempt) {
   const Task& task = episode.task;
   ExecutionRecord& record = episode.record;
   Localizer localizer(task, problem, policy, mover, record);
-  policies::Insert insert;
+  policies::Decision decision;
   try {
-    insert = localizer.Run();
+    decision = localizer.Run();
   } catch (const ExecutionFailure&) {
     attempt.evidence = localizer.evidence();
     throw;
@@ -72,7 +103,19 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
   attempt.orientation = left.front().hypothesis.orientation;
   attempt.evidence = localizer.evidence();
   attempt.target = Mean(left);
-  if (localizer.found_inside()) {
+  if (const auto* search = std::get_if<policies::SpiralSearch>(&decision)) {
+    return SearchAndInsert(episode, *search, mover, attempt);
+  }
+  if (std::holds_alternative<policies::Servo>(decision)) {
+    decision = FollowByEye(problem, decision, policy, mover, record);
+  }
+  const auto* wanted = std::get_if<policies::Insert>(&decision);
+  if (wanted == nullptr) throw ExecutionFailure("policy: neither inserts nor gives up after it has looked");
+  const policies::Insert& insert = *wanted;
+  if (insert.tool_T_target) {
+    attempt.target = mover.Locate(*insert.tool_T_target);
+    record.localized = true;
+  } else if (localizer.found_inside()) {
     attempt.target = localizer.found_inside();
     attempt.sure = true;
     record.fell_in = true;
@@ -106,7 +149,8 @@ bool IsSure(const Task& task, const TargetFit& fit) {
 
 LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
   const Region hull = HullOf(problem.hypotheses);
-  // The estimate is the centre of the chosen angles, which may lie half a step beside the frame (orientation_lattice.h).
+  // The estimate is the centre of the chosen angles, which may lie half a step beside the frame
+  // (orientation_lattice.h).
   std::vector<int> extents;
   for (const UncertainAxis& axis : task.axes) {
     std::set<int> places;

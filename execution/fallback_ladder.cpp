@@ -160,13 +160,16 @@ void Spiral(const Episode& episode, Attempt& attempt) {
   Log(episode, rung::kSpiral, attempt.reason);
   Mover mover = MoverFor(episode, attempt.frame);
   ComeOff(episode.task, *attempt.target, mover);
-  const auto found = SpiralSearch(episode.task, *attempt.target, {}, mover);
+  const auto found = FindBySpiral(episode.task, *attempt.target, {}, mover);
   if (!found) {
     attempt.end = AttemptEnd::kLost;
     attempt.reason = "spiral: no opening found";
     return;
   }
-  Conclude(episode, attempt.frame, *found, InsertFromHere(episode.task, *found, mover), attempt);
+  Conclude(
+      episode, attempt.frame, found->target,
+      found->at_bottom ? InsertionVerdict{true, false, "inserted"} : InsertFromHere(episode.task, found->target, mover),
+      attempt);
 }
 
 void TryAtMouth(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <set>
 #include <utility>
@@ -27,6 +28,18 @@ double ThreadCpuSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// What a policy throws in the middle of an episode is a failure of the episode.
+template <class Call>
+auto Guarded(const Call& call) {
+  try {
+    return call();
+  } catch (const std::exception& error) {
+    throw ExecutionFailure(fmt::format("policy threw: {}", error.what()));
+  } catch (...) {
+    throw ExecutionFailure("policy threw: no standard exception");
+  }
 }
 
 /// A touch from coordinate `from` along the direction to where the motion ended, at the place across where it ended.
@@ -60,21 +73,31 @@ policies::Belief Localizer::View() const {
 policies::Decision Localizer::Ask() {
   const policies::Belief belief = View();
   const double before = ThreadCpuSeconds();
-  policies::Decision decision = policy_.Next(belief);
+  policies::Decision decision = Guarded([&] { return policy_.Next(belief); });
   record_.policy_cpu_s += ThreadCpuSeconds() - before;
   return decision;
 }
 
-policies::Insert Localizer::Run() {
+bool Localizer::Tell(const Outcome& outcome) {
+  const double before = ThreadCpuSeconds();
+  const bool known = Guarded([&] { return policy_.Observe(outcome); });
+  record_.policy_cpu_s += ThreadCpuSeconds() - before;
+  return known;
+}
+
+policies::Decision Localizer::Run() {
+  const double before = ThreadCpuSeconds();
   policy_.Begin(problem_);
+  record_.policy_cpu_s += ThreadCpuSeconds() - before;
   if (record_.attempts++ == 0) record_.hypotheses = static_cast<int>(problem_.hypotheses.size());
   while (true) {
-    const policies::Decision decision = Ask();
-    if (const auto* insert = std::get_if<policies::Insert>(&decision)) return *insert;
+    policies::Decision decision = Ask();
     if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
       throw LostTrack("policy gave up: " + give_up->reason);
     }
-    if (tracked_.size() == 1) return {};  // readings are finer than outcomes: they may tell before the policy does
+    if (!std::holds_alternative<GuardedMove>(decision)) return decision;
+    // Readings are finer than outcomes: they may tell before the policy does.
+    if (tracked_.size() == 1) return policies::Insert{};
     const GuardedMove move = std::get<GuardedMove>(decision);
     if (move.cells < 1 || move.cells > 100000) {
       throw ExecutionFailure(fmt::format("policy: a guarded move of {} cells", move.cells));
@@ -85,7 +108,7 @@ policies::Insert Localizer::Run() {
       throw ExecutionFailure(fmt::format("limit: {} moves of the policy without a verdict", record_.policy_moves - 1));
     }
     Carry(move);
-    if (found_inside_) return {};
+    if (found_inside_) return policies::Insert{};
   }
 }
 
@@ -224,10 +247,7 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tol
   const MatchOptions matching{tolerance_cells};
   const std::vector<OutcomeMatch> matches = MatchOutcomes(*problem_.map, tracked_, robot_, move, touch, matching);
   for (const OutcomeMatch& match : matches) {
-    const double before = ThreadCpuSeconds();
-    const bool known = policy_.Observe(match.outcome);
-    record_.policy_cpu_s += ThreadCpuSeconds() - before;
-    if (!known) continue;
+    if (!Tell(match.outcome)) continue;
     if (touch.contact) {
       const TrackedHypothesis& best = tracked_[match.best];
       const int axis = AxisOf(touch.direction);

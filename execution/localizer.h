@@ -25,9 +25,10 @@ class Localizer {
   Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
             ExecutionRecord& record);
 
-  /// Until the policy wants to insert, one hypothesis is left, or the tool fell into the opening. Throws
-  /// ExecutionFailure.
-  policies::Insert Run();
+  /// Until the policy has no further guarded move (its last decision is returned, but for GiveUp), one hypothesis is
+  /// left, or the tool fell into the opening (both: Insert). Throws ExecutionFailure, also for whatever the policy
+  /// throws once the episode has begun; what its Begin throws is passed on.
+  policies::Decision Run();
 
   /// Set if the tool fell into the opening and felt where it is: the position of the target (lattice coordinates).
   const std::optional<Eigen::Vector3d>& found_inside() const { return found_inside_; }
@@ -44,6 +45,7 @@ class Localizer {
 
   policies::Belief View() const;
   policies::Decision Ask();
+  bool Tell(const Outcome& outcome);
   /// Where the tool is to stand in the present robot cell.
   Eigen::Vector3d Station() const { return robot_.cast<double>() + problem_.map->phase() + anchor_ + kept_offset_; }
   Prediction Predict(const GuardedMove& move) const;

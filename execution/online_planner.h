@@ -2,10 +2,9 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "planner/belief/problem.h"
-#include "planner/solver/solve.h"
+#include "policies/planning_tables_cache.h"
 #include "policies/policy.h"
 
 namespace feeler::execution {
@@ -21,15 +20,8 @@ class OnlinePlanner {
   std::unique_ptr<policies::Policy> PolicyFor(const planner::Problem& problem);
 
  private:
-  std::shared_ptr<const planner::PlanningTables> TablesFor(const planner::Problem& problem,
-                                                           const planner::SolverOptions& options);
-
   std::int64_t expansion_limit_;
-  std::mutex mutex_;  // guards all below
-  std::shared_ptr<const planner::ContactMap> map_;
-  CostWeights cost_;
-  GoalKind goal_ = GoalKind::kSingleton;
-  std::shared_ptr<const planner::PlanningTables> tables_;
+  policies::PlanningTablesCache tables_;
 };
 
 }  // namespace feeler::execution

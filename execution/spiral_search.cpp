@@ -7,7 +7,6 @@
 namespace feeler::execution {
 namespace {
 
-constexpr double kStandoff_m = 0.003;
 /// The tool has dropped into the opening, not just over an unevenness.
 constexpr double kDrop_m = 0.0008;
 /// Stiffness along the insertion with which it is pressed, N/m: a compliant motion's own.
@@ -15,40 +14,54 @@ constexpr double kStiffness_n_m = 4000.0;
 /// Way points per turn, and how many of them make one motion.
 constexpr int kPerTurn = 16;
 constexpr int kPerMotion = 8;
+/// A tool that follows less than half of a spiral this wide, on both sides, is held: it fell right into the opening.
+constexpr double kHeldRadius_m = 0.002;
+
+/// The tool stands in the opening, deeper than its mouth: pushes it down.
+SpiralFind PushDown(const Task& task, Mover& mover) {
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  const double depth = mover.Cells(task.insertion_depth_m);
+  const MotionReport report = mover.Insert(mover.position() + depth * inward);
+  return {report.end - depth * inward, true};
+}
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> SpiralSearch(const Task& task, const Eigen::Vector3d& target,
-                                            const SpiralOptions& options, Mover& mover) {
+std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& target,
+                                       const policies::SpiralSearch& search, Mover& mover) {
   const int axis = AxisOf(task.insertion);
   const Eigen::Vector3d inward = UnitVector(task.insertion);
   const Eigen::Vector3d u = Eigen::Vector3d::Unit((axis + 1) % 3);
   const Eigen::Vector3d v = Eigen::Vector3d::Unit((axis + 2) % 3);
-  mover.Retreat(target - mover.Cells(kStandoff_m) * inward);
-  const MotionReport face =
-      mover.Probe(task.insertion, (target + mover.Cells(kStandoff_m) * inward)[axis], "spiral", PredictedCells{});
-  if (!face.contact) return face.end;  // it went in where the face was expected
+  const double range = mover.Cells(search.face_range_m);
+  mover.Retreat(target - range * inward);
+  const MotionReport face = mover.Probe(task.insertion, (target + range * inward)[axis], "spiral", PredictedCells{});
+  if (!face.contact) return PushDown(task, mover);
   const double height = face.end[axis];
-  const double pressed = height + SignOf(task.insertion) * mover.Cells(options.press_n / kStiffness_n_m);
-  const double turns = options.radius_m / options.pitch_m;
+  const double pressed = height + SignOf(task.insertion) * mover.Cells(search.press_n / kStiffness_n_m);
+  const int points = static_cast<int>(search.radius_m / search.pitch_m * kPerTurn);
   std::vector<Eigen::Vector3d> way;
-  for (int i = 1; i <= static_cast<int>(turns * kPerTurn); ++i) {
+  int held = 0;
+  for (int i = 1; i <= points; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / kPerTurn;
-    const double radius = mover.Cells(options.pitch_m) * i / kPerTurn;
+    const double radius = mover.Cells(search.pitch_m) * i / kPerTurn;
     Eigen::Vector3d place = target + radius * (std::cos(angle) * u + std::sin(angle) * v);
     place[axis] = pressed;
     way.push_back(place);
-    const bool last = i == static_cast<int>(turns * kPerTurn);
-    if (i % kPerMotion != 0 && !last) continue;
-    const MotionReport report = mover.Press(way, options.speed_m_s, "spiral");
+    if (i % kPerMotion != 0 && i != points) continue;
+    const MotionReport report = mover.Press(way, search.speed_m_s, "spiral");
     way.clear();
     if (SignOf(task.insertion) * (report.end[axis] - height) > mover.Cells(kDrop_m)) {
       Eigen::Vector3d found = report.end;
       found[axis] = height;
-      return found;
+      return SpiralFind{found, false};
     }
+    Eigen::Vector3d followed = report.end - target;
+    followed[axis] = 0.0;
+    held = radius > mover.Cells(kHeldRadius_m) && followed.norm() < 0.5 * radius ? held + 1 : 0;
+    if (held == 2) return PushDown(task, mover);
   }
-  mover.Retreat(target - mover.Cells(kStandoff_m) * inward);
+  mover.Retreat(target - range * inward);
   return std::nullopt;
 }
 

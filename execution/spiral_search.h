@@ -5,20 +5,19 @@
 
 #include "core/task.h"
 #include "execution/mover.h"
+#include "policies/policy.h"
 
 namespace feeler::execution {
 
-struct SpiralOptions {
-  double radius_m = 0.0045;
-  double pitch_m = 0.0015;
-  double speed_m_s = 0.02;
-  double press_n = 10.0;  ///< of the tool on the face around the opening
+struct SpiralFind {
+  /// Of the target (lattice coordinates), its mouth at the height of the face.
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  bool at_bottom = false;  ///< the tool came down right into the opening and stands at its bottom; else in the mouth
 };
 
 /// Presses the tool on the face around the opening, expected under `target` (lattice coordinates), and draws a spiral
-/// from there until it drops in. Returns the position of the target that this shows (its mouth at the height of the
-/// face); the tool is then in the mouth. Empty if it never drops; the tool is then off the face.
-std::optional<Eigen::Vector3d> SpiralSearch(const Task& task, const Eigen::Vector3d& target,
-                                            const SpiralOptions& options, Mover& mover);
+/// from there until it drops in. Empty if it never drops; the tool is then off the face.
+std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& target,
+                                       const policies::SpiralSearch& search, Mover& mover);
 
 }  // namespace feeler::execution
