@@ -10,6 +10,7 @@
 #include "planner/solver/solve.h"
 #include "policies/database_policy.h"
 #include "policies/storage/database.h"
+#include "policies/touch_based_localization.h"
 #include "tests/planner/synthetic_plug.h"
 
 namespace feeler::policies {
@@ -105,6 +106,18 @@ void NextMove(benchmark::State& state) {
       benchmark::Counter(static_cast<double>(moves), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(NextMove)->Arg(3)->Arg(kLargest)->Unit(benchmark::kMicrosecond);
+
+/// One planning step of touch-based localization, 100 sampled actions, from the start belief of n^3 hypotheses.
+void TouchPlanningStep(benchmark::State& state) {
+  const planner::Problem problem = TheDatabase().Problem(static_cast<int>(state.range(0)));
+  TouchOptions options;
+  options.region = std::make_shared<const planner::ActiveRegion>(*problem.map);
+  TouchBasedLocalization policy(options, nullptr, 1, 0);
+  policy.Begin(problem);
+  const Belief belief{problem.start, problem.hypotheses};
+  for (auto _ : state) benchmark::DoNotOptimize(policy.Choose(belief));
+}
+BENCHMARK(TouchPlanningStep)->Arg(3)->Arg(kLargest)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace feeler::policies

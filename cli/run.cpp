@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "cli/commands.h"
 #include "cli/progress_bar.h"
@@ -26,6 +27,7 @@ struct Flags {
   std::string task;
   std::string db;
   std::string policy = "database";
+  std::vector<std::string> policy_options;
   std::string extents;
   std::string noise = "ideal";
   std::string out;
@@ -90,7 +92,8 @@ void Run(const Flags& flags, Session& session) {
   if (!flags.db.empty()) {
     database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(flags.db));
   }
-  const workflow::PolicyFactory policy_factory = workflow::MakePolicyFactory(flags.policy, database);
+  const workflow::PolicyFactory policy_factory =
+      workflow::MakePolicyFactory(flags.policy, database, workflow::ParsePolicyOptions(flags.policy_options));
 
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
@@ -163,6 +166,8 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--db", flags->db, "policy database of the task (feeler preprocess)");
   command->add_option("--policy", flags->policy, Joined(workflow::PolicyNames()))->capture_default_str();
+  command->add_option("--policy-option", flags->policy_options,
+                      "KEY=VALUE, an option of the policy (docs/add-a-policy.md); may be given several times");
   command->add_option("--episodes", flags->episodes, "how many")->capture_default_str();
   command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
   command->add_option("--extents", flags->extents,

@@ -58,7 +58,11 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["path_length_m"] = execution.path_length_m;
   json["sim_time_s"] = execution.sim_time_s;
   json["localization_time_s"] = execution.localization_time_s;
+  json["depth_m"] = record.depth_m;
+  json["lateral_m"] = record.lateral_m;
   json["peak_force_n"] = record.peak_force_n;
+  json["impulse_ns"] = record.impulse_ns;
+  json["forbidden_contacts"] = record.forbidden_contacts;
   json["fell_in"] = execution.fell_in;
   json["ladder"] = nlohmann::ordered_json::array();
   for (const execution::LadderRecord& rung : execution.ladder) {

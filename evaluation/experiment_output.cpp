@@ -52,6 +52,19 @@ nlohmann::json ManifestJson(const Manifest& manifest) {
           {"machine", Machine()}};
 }
 
+nlohmann::json ToJson(const Figure& figure) {
+  nlohmann::json json = {{"title", figure.title}, {"x_label", figure.x_label}, {"y_label", figure.y_label},
+                         {"x_log", figure.x_log}, {"y_log", figure.y_log},     {"series", nlohmann::json::array()}};
+  for (const FigureSeries& series : figure.series) {
+    nlohmann::json points = nlohmann::json::array();
+    for (const FigurePoint& p : series.points) {
+      points.push_back({{"x", p.x}, {"y", p.y}, {"low", p.low}, {"high", p.high}});
+    }
+    json["series"].push_back({{"name", series.name}, {"points", std::move(points)}});
+  }
+  return json;
+}
+
 std::string ToCsv(const ResultTable& table) {
   std::string csv;
   for (std::size_t i = 0; i < table.columns.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(table.columns[i]);
@@ -83,7 +96,7 @@ void WriteFileAtomically(const std::string& path, const std::string& content) {
 }
 
 void WriteExperiment(const std::string& folder, const std::string& name, const ResultTable& table,
-                     const nlohmann::json& details, const Manifest& manifest) {
+                     const nlohmann::json& details, const Manifest& manifest, const std::vector<Figure>& figures) {
   for (const auto& row : table.rows) {
     if (row.size() != table.columns.size()) {
       throw InputError("experiment " + name, "a row has " + std::to_string(row.size()) + " cells for " +
@@ -93,8 +106,9 @@ void WriteExperiment(const std::string& folder, const std::string& name, const R
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be created: " + error.message(), "choose another folder");
-  const nlohmann::json document = {
-      {"name", name}, {"columns", table.columns}, {"rows", table.rows}, {"details", details}};
+  nlohmann::json document = {{"name", name}, {"columns", table.columns}, {"rows", table.rows}, {"details", details}};
+  document["figures"] = nlohmann::json::array();
+  for (const Figure& figure : figures) document["figures"].push_back(ToJson(figure));
   WriteFileAtomically(folder + "/" + name + ".csv", ToCsv(table));
   WriteFileAtomically(folder + "/" + name + ".json", document.dump(2) + "\n");
   WriteFileAtomically(folder + "/manifest.json", ManifestJson(manifest).dump(2) + "\n");

@@ -65,7 +65,8 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode, noise_);
   const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
   const double plan_start_s = ThreadCpuSeconds();
-  const std::unique_ptr<policies::Policy> policy = policy_factory_(problem, draw.extents);
+  const std::unique_ptr<policies::Policy> policy =
+      policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});
   const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
   if (noise_.fall_in) {
     RandomStream random(options_.seed, episode, "truth that falls in");
@@ -133,7 +134,12 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
     record.localized = WithinTolerance(task.tolerance, *record.error);
   }
   record.inserted = verdict.inserted;
-  record.peak_force_n = environment_->robot().statistics().peak_force_n;
+  record.depth_m = verdict.depth_m;
+  record.lateral_m = verdict.lateral_m;
+  const env::RobotStatistics& statistics = environment_->robot().statistics();
+  record.peak_force_n = statistics.peak_force_n;
+  record.impulse_ns = statistics.impulse_ns;
+  record.forbidden_contacts = statistics.forbidden_contacts;
   if (record.inserted) {
     record.reason = "inserted";
   } else if (record.execution.inserted) {

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <functional>
 #include <numbers>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
 
@@ -35,6 +38,53 @@ constexpr WorldNoise kWorldNoises[] = {
     {"yaw-3", "the target is turned by 3 degrees", [](EpisodeNoise& n) { AddYaw(n, 3.0); }},
 };
 
+/// Names with a number, "force-noise=2".
+struct MeasuredNoise {
+  const char* name;
+  const char* meaning;
+  double least;
+  double most;
+  void (*add)(EpisodeNoise& noise, double value);
+};
+
+constexpr MeasuredNoise kMeasuredNoises[] = {
+    {"force-noise", "noise of the force sensor, N; contacts are told from 4 N + 6 times that on", 0.0, 50.0,
+     [](EpisodeNoise& n, double newton) {
+       n.robot.force_noise_n = newton;
+       n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 4.0 + 6.0 * newton);
+     }},
+    {"joint-friction", "friction of the large joints, Nm; the wrists have two fifths of it", 0.0, 30.0,
+     [](EpisodeNoise& n, double torque_nm) {
+       for (int i = 0; i < env::kJointCount; ++i) n.robot.joint_friction_nm[i] = (i < 3 ? 1.0 : 0.4) * torque_nm;
+       // Friction that the observer has not caught up with reads as force at the tool.
+       if (torque_nm > 0.0) n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 10.0);
+     }},
+    {"stiffness", "stiffness of each joint between encoder and link, Nm/rad (a UR10e has some 50000)", 1000.0, 1e9,
+     [](EpisodeNoise& n, double stiffness) { n.robot.joint_stiffness_nm_rad = stiffness; }},
+    {"yaw", "the target is turned by so many degrees, either way", 0.0, 30.0,
+     [](EpisodeNoise& n, double degrees) { AddYaw(n, degrees); }},
+};
+
+/// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.
+bool AddMeasured(const std::string& text, EpisodeNoise& noise) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) return false;
+  const std::string name = text.substr(0, equals);
+  for (const MeasuredNoise& measured : kMeasuredNoises) {
+    if (name != measured.name) continue;
+    std::istringstream number(text.substr(equals + 1));
+    double value = 0.0;
+    if (!(number >> value) || !number.eof() || !(value >= measured.least && value <= measured.most)) {
+      throw InputError(
+          "noise", "'" + text + "' has no sensible number",
+          "give " + name + "=NUMBER of " + std::to_string(measured.least) + " to " + std::to_string(measured.most));
+    }
+    measured.add(noise, value);
+    return true;
+  }
+  return false;
+}
+
 const char* MeaningOfArmNoise(const std::string& name) {
   if (name == "ideal") return "nothing";
   if (name == "friction") return "3 Nm of friction in the large joints, 1.2 Nm in the wrists, force noise of 1 N";
@@ -57,13 +107,27 @@ std::vector<NoiseName> NoiseNames() {
   std::vector<NoiseName> names;
   for (const std::string& name : env::NoisePresetNames()) names.push_back({name, MeaningOfArmNoise(name)});
   for (const WorldNoise& world : kWorldNoises) names.push_back({world.name, world.meaning});
+  for (const MeasuredNoise& measured : kMeasuredNoises) {
+    names.push_back({std::string(measured.name) + "=NUMBER", measured.meaning});
+  }
   return names;
 }
+
+namespace {
+
+InputError UnknownNoise(const std::string& name) {
+  std::string known;
+  for (const NoiseName& n : NoiseNames()) known += (known.empty() ? "" : ", ") + n.name;
+  return {"noise", "no noise is named '" + name + "'", "one of, or several with commas: " + known};
+}
+
+}  // namespace
 
 EpisodeNoise ParseNoise(std::string_view text) {
   EpisodeNoise noise;
   noise.robot = env::NoisePreset("ideal");
   bool arm_given = false;
+  std::vector<std::string> measured;  // these change what presets set
   std::vector<std::string> seen;
   for (const std::string& name : Split(text)) {
     if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
@@ -76,16 +140,21 @@ EpisodeNoise ParseNoise(std::string_view text) {
       world->add(noise);
       continue;
     }
+    if (name.find('=') != std::string::npos) {
+      measured.push_back(name);
+      continue;
+    }
     const std::vector<std::string> arm = env::NoisePresetNames();
     if (std::find(arm.begin(), arm.end(), name) == arm.end()) {
-      std::string known;
-      for (const NoiseName& n : NoiseNames()) known += (known.empty() ? "" : ", ") + n.name;
-      throw InputError("noise", "no noise is named '" + name + "'", "one of, or several with commas: " + known);
+      throw UnknownNoise(name);
     }
     if (name == "ideal") continue;
     if (arm_given) throw InputError("noise", "two noises of the arm", "give one of them");
     arm_given = true;
     noise.robot = env::NoisePreset(name);
+  }
+  for (const std::string& name : measured) {
+    if (!AddMeasured(name, noise)) throw UnknownNoise(name);
   }
   if (noise.outside && noise.fall_in) {
     throw InputError("noise", "'outside' and 'fall-in' both say where the target stands", "give one of them");

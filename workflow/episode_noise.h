@@ -27,8 +27,9 @@ struct NoiseName {
 /// Every name that ParseNoise takes, with a line about each.
 std::vector<NoiseName> NoiseNames();
 
-/// One name or several with commas between ("friction,yaw-2"): at most one of the arm, the rest add up. Throws
-/// InputError for an unknown name, listing the known ones, and for names that contradict each other.
+/// One name or several with commas between ("friction,yaw-2", "force-noise=2,yaw=1.5"): at most one of the arm, the
+/// rest add up. Throws InputError for an unknown name, listing the known ones, and for names that contradict each
+/// other.
 EpisodeNoise ParseNoise(std::string_view text);
 
 }  // namespace feeler::workflow

@@ -33,7 +33,11 @@ struct EpisodeRecord {
   bool localized = false;                     ///< the final estimate lies within the task's tolerance on every axis
   bool inserted = false;                      ///< as the environment judges it
   std::string reason;                         ///< "inserted", or why not
+  double depth_m = 0.0;                       ///< of the tool below the mouth, along the insertion, at the verdict
+  double lateral_m = 0.0;                     ///< of the tool beside the axis of the opening, at the verdict
   double peak_force_n = 0.0;                  ///< exact contact force on tool and gripper
+  double impulse_ns = 0.0;                    ///< its time integral
+  int forbidden_contacts = 0;                 ///< env::RobotStatistics
   execution::ExecutionRecord execution;       ///< what the executor did and believes
   std::optional<Replay> replay;               ///< if it was asked for
 

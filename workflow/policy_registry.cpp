@@ -1,41 +1,162 @@
 #include "workflow/policy_registry.h"
 
-#include <array>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <mutex>
+#include <sstream>
+#include <utility>
 
 #include "core/error.h"
+#include "env/mesh_outcomes.h"
 #include "policies/database_policy.h"
+#include "policies/hybrid_policy.h"
 #include "policies/open_loop.h"
+#include "policies/touch_based_localization.h"
+#include "policies/visual_servoing.h"
+#include "workflow/visual_goal.h"
 
 namespace feeler::workflow {
 namespace {
 
+using PolicyPointer = std::unique_ptr<policies::Policy>;
+
+/// The active region of a contact map, found once.
+class RegionCache {
+ public:
+  std::shared_ptr<const planner::ActiveRegion> RegionOf(const std::shared_ptr<const planner::ContactMap>& map) {
+    const std::lock_guard lock(mutex_);
+    if (map_ != map) {
+      region_ = std::make_shared<const planner::ActiveRegion>(*map);
+      map_ = map;
+    }
+    return region_;
+  }
+
+ private:
+  std::mutex mutex_;  // guards both below
+  std::shared_ptr<const planner::ContactMap> map_;
+  std::shared_ptr<const planner::ActiveRegion> region_;
+};
+
+/// What the policies of a factory share.
+struct Shared {
+  std::shared_ptr<policies::Database> database;
+  PolicyOptions options;
+  std::shared_ptr<policies::PlanningTablesCache> tables = std::make_shared<policies::PlanningTablesCache>();
+  std::shared_ptr<VisualGoalOnce> visual_goal = std::make_shared<VisualGoalOnce>();
+  std::shared_ptr<RegionCache> regions = std::make_shared<RegionCache>();
+};
+
+/// A policy by its name. A new one: a function, and a line in kPolicies.
 struct Entry {
   const char* name;
   bool needs_database;
   bool uses_ladder;
-  std::unique_ptr<policies::Policy> (*make)(policies::Database* database, const planner::Problem& problem,
-                                            const planner::Extents& extents);
+  PolicyPointer (*make)(const PolicyRequest& request, const Shared& shared);
 };
 
-std::unique_ptr<policies::Policy> MakeDatabase(policies::Database* database, const planner::Problem& /*problem*/,
-                                               const planner::Extents& extents) {
-  const auto stored = database->Get(extents);
+PolicyPointer MakeDatabase(const PolicyRequest& request, const Shared& shared) {
+  const auto stored = shared.database->Get(request.extents);
   if (!stored || !stored->policy) {
-    throw InputError(database->path(), "holds no policy for problem " + planner::ToString(extents),
-                     "add it with feeler preprocess --family " + planner::ToString(extents));
+    throw InputError(shared.database->path(), "holds no policy for problem " + planner::ToString(request.extents),
+                     "add it with feeler preprocess --family " + planner::ToString(request.extents));
   }
   return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::Policy>(*stored->policy));
 }
 
-std::unique_ptr<policies::Policy> MakeOpenLoop(policies::Database* /*database*/, const planner::Problem& /*problem*/,
-                                               const planner::Extents& /*extents*/) {
+PolicyPointer MakeOnline(const PolicyRequest& /*request*/, const Shared& shared) {
+  return std::make_unique<policies::OnlinePolicy>(shared.options.online, shared.tables);
+}
+
+PolicyPointer MakeOpenLoop(const PolicyRequest& /*request*/, const Shared& /*shared*/) {
   return std::make_unique<policies::OpenLoopPolicy>();
 }
 
-constexpr std::array<Entry, 2> kPolicies = {{
+PolicyPointer MakeSpiral(const PolicyRequest& request, const Shared& shared) {
+  const Task& task = request.setup.task();
+  return std::make_unique<policies::SpiralPolicy>(task.insertion, task.cell_m,
+                                                  shared.options.spiral.value_or(TunedSpiral(task)));
+}
+
+PolicyPointer MakeHybrid(const PolicyRequest& request, const Shared& shared) {
+  const Task& task = request.setup.task();
+  const double threshold_m =
+      shared.options.hybrid_threshold_m > 0.0 ? shared.options.hybrid_threshold_m : MeasuredHybridThreshold(task);
+  return std::make_unique<policies::HybridPolicy>(MakeSpiral(request, shared), MakeDatabase(request, shared),
+                                                  task.insertion, task.cell_m, threshold_m);
+}
+
+PolicyPointer MakeTouch(const PolicyRequest& request, const Shared& shared, const char* name,
+                        policies::TouchCriterion criterion, std::unique_ptr<planner::OutcomeModel> outcomes = nullptr) {
+  policies::TouchOptions options;
+  options.criterion = criterion;
+  options.actions = shared.options.tbl_actions;
+  options.name = name;
+  options.region = shared.regions->RegionOf(request.setup.map);
+  return std::make_unique<policies::TouchBasedLocalization>(std::move(options), std::move(outcomes), request.seed,
+                                                            request.episode);
+}
+
+PolicyPointer MakeTbl(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl", policies::TouchCriterion::kInformationGain);
+}
+
+PolicyPointer MakeTblMesh(const PolicyRequest& request, const Shared& shared) {
+  const PlanningSetup& setup = request.setup;
+  return MakeTouch(request, shared, "tbl-mesh", policies::TouchCriterion::kInformationGain,
+                   std::make_unique<env::MeshOutcomes>(setup.model, setup.opening, setup.map->phase()));
+}
+
+PolicyPointer MakeTblPerCost(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl-per-cost", policies::TouchCriterion::kInformationGainPerCost);
+}
+
+PolicyPointer MakeTblSubmodular(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl-submodular", policies::TouchCriterion::kPruningPerCost);
+}
+
+PolicyPointer MakeRandom(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "random", policies::TouchCriterion::kAny);
+}
+
+PolicyPointer MakeVisualServoing(const char* name, std::shared_ptr<const policies::VisualGoal> goal, bool tape) {
+  std::unique_ptr<policies::FeatureTracker> tracker =
+      tape ? policies::MakeTapeTracker(goal) : policies::MakeSiftTracker(goal);
+  policies::VisualServoingOptions options;
+  if (!tape) options.frame_period_s = 1.0 / 15.0;  // what finding the features takes
+  return std::make_unique<policies::VisualServoingPolicy>(name, std::move(goal), std::move(tracker), options);
+}
+
+/// By the corners of red tape where the goal shows one, else by SIFT features.
+PolicyPointer MakeVisual(const PolicyRequest& request, const Shared& shared) {
+  const auto goal = shared.visual_goal->For(request.setup);
+  return MakeVisualServoing("visual-servoing", goal, policies::MakeTapeTracker(goal)->goal_features() > 0);
+}
+
+PolicyPointer MakeVisualTape(const PolicyRequest& request, const Shared& shared) {
+  return MakeVisualServoing("visual-servoing-tape", shared.visual_goal->For(request.setup), true);
+}
+
+PolicyPointer MakeVisualSift(const PolicyRequest& request, const Shared& shared) {
+  return MakeVisualServoing("visual-servoing-sift", shared.visual_goal->For(request.setup), false);
+}
+
+constexpr Entry kPolicies[] = {
     {"database", true, true, MakeDatabase},
+    {"online", false, true, MakeOnline},
+    {"tbl", false, true, MakeTbl},
+    {"tbl-mesh", false, true, MakeTblMesh},
+    {"tbl-per-cost", false, true, MakeTblPerCost},
+    {"tbl-submodular", false, true, MakeTblSubmodular},
+    {"random", false, true, MakeRandom},
+    {"hybrid", true, true, MakeHybrid},
+    {"spiral", false, false, MakeSpiral},
     {"open-loop", false, false, MakeOpenLoop},
-}};
+    {"visual-servoing", false, false, MakeVisual},
+    {"visual-servoing-tape", false, false, MakeVisualTape},
+    {"visual-servoing-sift", false, false, MakeVisualSift},
+};
 
 const Entry& Find(const std::string& name) {
   for (const Entry& entry : kPolicies) {
@@ -46,7 +167,71 @@ const Entry& Find(const std::string& name) {
   throw InputError("--policy", "unknown policy \"" + name + "\"", "choose one of " + known);
 }
 
+struct Setting {
+  const char* key;
+  void (*set)(PolicyOptions& options, double value);
+};
+
+policies::SpiralTuning& Spiral(PolicyOptions& options) {
+  if (!options.spiral) options.spiral.emplace();
+  return *options.spiral;
+}
+
+constexpr Setting kSettings[] = {
+    {"tbl-actions", [](PolicyOptions& o, double v) { o.tbl_actions = static_cast<int>(v); }},
+    {"online-seconds", [](PolicyOptions& o, double v) { o.online.time_limit_s = v; }},
+    {"online-expansions", [](PolicyOptions& o, double v) { o.online.expansion_limit = static_cast<std::int64_t>(v); }},
+    {"spiral-pitch", [](PolicyOptions& o, double v) { Spiral(o).pitch_m = v; }},
+    {"spiral-speed", [](PolicyOptions& o, double v) { Spiral(o).speed_m_s = v; }},
+    {"spiral-force", [](PolicyOptions& o, double v) { Spiral(o).press_n = v; }},
+    {"hybrid-threshold", [](PolicyOptions& o, double v) { o.hybrid_threshold_m = v; }},
+};
+
+struct Tuned {
+  const char* task;
+  policies::SpiralTuning spiral;
+  double hybrid_threshold_m;
+};
+
+// Measured: docs/experiments.md. The last one serves every task that is not named.
+constexpr Tuned kTuned[] = {
+    {"plug", {0.0015, 0.02, 10.0}, 0.008},
+    {"plug-tight", {0.0004, 0.02, 10.0}, 0.004},
+};
+
+const Tuned& TunedFor(const Task& task) {
+  const auto* tuned =
+      std::find_if(std::begin(kTuned), std::end(kTuned), [&](const Tuned& t) { return task.name == t.task; });
+  return tuned == std::end(kTuned) ? *std::prev(std::end(kTuned)) : *tuned;
+}
+
 }  // namespace
+
+PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings) {
+  PolicyOptions options;
+  for (const std::string& text : settings) {
+    const std::size_t equals = text.find('=');
+    const std::string key = text.substr(0, equals);
+    const auto* setting =
+        std::find_if(std::begin(kSettings), std::end(kSettings), [&](const Setting& s) { return key == s.key; });
+    if (setting == std::end(kSettings)) {
+      std::string known;
+      for (const Setting& s : kSettings) known += (known.empty() ? "" : ", ") + std::string(s.key);
+      throw InputError("--policy-option", "unknown option \"" + key + "\"", "KEY=VALUE with a KEY of " + known);
+    }
+    std::istringstream number(equals == std::string::npos ? "" : text.substr(equals + 1));
+    double value = 0.0;
+    if (!(number >> value) || !number.eof() || !std::isfinite(value) || value < 0.0 || value > 1e12) {
+      throw InputError("--policy-option", "\"" + text + "\" has no sensible value",
+                       "give KEY=NUMBER, e.g. " + key + "=1");
+    }
+    setting->set(options, value);
+  }
+  return options;
+}
+
+policies::SpiralTuning TunedSpiral(const Task& task) { return TunedFor(task).spiral; }
+double MeasuredHybridThreshold(const Task& task) { return TunedFor(task).hybrid_threshold_m; }
 
 std::vector<std::string> PolicyNames() {
   std::vector<std::string> names;
@@ -56,14 +241,14 @@ std::vector<std::string> PolicyNames() {
 
 bool UsesLadder(const std::string& name) { return Find(name).uses_ladder; }
 
-PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database) {
+PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database,
+                                const PolicyOptions& options) {
   const Entry& entry = Find(name);
   if (entry.needs_database && !database) {
     throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
   }
-  return [make = entry.make, database](const planner::Problem& problem, const planner::Extents& extents) {
-    return make(database.get(), problem, extents);
-  };
+  const auto shared = std::make_shared<const Shared>(Shared{std::move(database), options});
+  return [make = entry.make, shared](const PolicyRequest& request) { return make(request, *shared); };
 }
 
 }  // namespace feeler::workflow

@@ -1,21 +1,52 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "planner/belief/problem.h"
 #include "planner/preprocess/problem_family.h"
+#include "policies/online_policy.h"
 #include "policies/policy.h"
+#include "policies/spiral_policy.h"
 #include "policies/storage/database.h"
+#include "workflow/planning_setup.h"
 
 namespace feeler::workflow {
 
-/// Gives the policy for one problem; called once an episode. Safe to call from several threads. Throws InputError if
-/// there is no policy for the problem.
-using PolicyFactory =
-    std::function<std::unique_ptr<policies::Policy>(const planner::Problem& problem, const planner::Extents& extents)>;
+/// What a policy is made for: one episode.
+struct PolicyRequest {
+  const planner::Problem& problem;
+  planner::Extents extents;
+  const PlanningSetup& setup;
+  std::uint64_t seed = 1;  ///< of policies that draw, with `episode`
+  std::uint64_t episode = 0;
+};
+
+/// Gives the policy for an episode; called once each. Safe to call from several threads. Throws InputError if there is
+/// no policy for the problem.
+using PolicyFactory = std::function<std::unique_ptr<policies::Policy>(const PolicyRequest& request)>;
+
+/// Options of policies; each policy reads those that concern it.
+struct PolicyOptions {
+  int tbl_actions = 100;  ///< sampled per planning step by touch-based localization; 0: every action
+  policies::OnlineOptions online;
+  std::optional<policies::SpiralTuning> spiral;  ///< default: as tuned for the task (TunedSpiral)
+  double hybrid_threshold_m = 0.0;               ///< half width of the uncertainty; 0: as measured for the task
+};
+/// Parses "key=value" settings of `--policy-option`: tbl-actions, online-seconds, online-expansions, spiral-pitch,
+/// spiral-speed, spiral-force, hybrid-threshold. Throws InputError listing the keys for an unknown one.
+PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings);
+
+/// The best settings that `feeler experiment spiral-tuning` found for the socket of a task; for other tasks those of
+/// the tightest socket.
+policies::SpiralTuning TunedSpiral(const Task& task);
+/// Below this half width of the uncertainty the spiral is faster than touch, as `feeler experiment baselines` measured
+/// it for the socket of a task.
+double MeasuredHybridThreshold(const Task& task);
 
 /// Names that `MakePolicyFactory` knows.
 std::vector<std::string> PolicyNames();
@@ -26,6 +57,7 @@ bool UsesLadder(const std::string& name);
 
 /// The factory of a policy by its name. `database` serves the policies that read one and may be null for the others.
 /// Throws InputError for an unknown name (listing the known) or a missing database.
-PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database);
+PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database,
+                                const PolicyOptions& options = {});
 
 }  // namespace feeler::workflow

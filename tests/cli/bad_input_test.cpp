@@ -105,6 +105,11 @@ TEST(BadUsage, PreprocessRefusesBadFamiliesAndPlaces) {
 TEST(BadUsage, RunRefusesWhatItCannotRun) {
   ExpectOneError(RunFeeler({"run", "--task", "plug"}), "--db");
   ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "psychic"}), "psychic");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "psychic"}), "tbl-submodular");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "tbl", "--policy-option", "patience=3"}),
+                 "tbl-actions");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "tbl", "--policy-option", "tbl-actions=many"}),
+                 "tbl-actions=many");
   ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--episodes", "0"}), "--episodes");
   ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--episodes", "-5"}), "--episodes");
   ExpectOneError(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--noise", "loud"}), "loud");

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "evaluation/experiment_output.h"
 
 namespace feeler::evaluation {
@@ -37,6 +38,35 @@ TEST(Quantile, InterpolatesOrderStatistics) {
   EXPECT_DOUBLE_EQ(Quantile({}, 0.5), 0);
 }
 
+TEST(Bootstrap, CoversTheTruthAboutAsOftenAsItSays) {
+  int covered = 0;
+  constexpr int kSamples = 200;
+  for (std::uint64_t k = 0; k < kSamples; ++k) {
+    RandomStream random(1, k, "bootstrap test");
+    std::vector<double> values;
+    for (int i = 0; i < 60; ++i) values.push_back(random.Uniform());
+    const Estimate median = BootstrapMedian(values);
+    EXPECT_DOUBLE_EQ(median.value, Median(values));
+    EXPECT_LE(median.low, median.value);
+    EXPECT_GE(median.high, median.value);
+    covered += median.low <= 0.5 && 0.5 <= median.high ? 1 : 0;
+  }
+  EXPECT_GT(covered, kSamples * 0.90);
+  EXPECT_LT(covered, kSamples);
+}
+
+TEST(Bootstrap, IsAFunctionOfTheValuesAndKeepsPairs) {
+  const std::vector<double> values = {4, 1, 3, 9, 2};
+  EXPECT_EQ(BootstrapMean(values).low, BootstrapMean(values).low);
+  EXPECT_DOUBLE_EQ(BootstrapMean(values).value, 3.8);
+  // Pairs in a fixed ratio have that ratio in every resample.
+  const Estimate ratio = BootstrapRatio({8, 2, 6, 18, 4}, values);
+  EXPECT_DOUBLE_EQ(ratio.low, 2.0);
+  EXPECT_DOUBLE_EQ(ratio.high, 2.0);
+  EXPECT_EQ(BootstrapMedian({}).high, 0.0);
+  EXPECT_THROW(BootstrapRatio({1}, {1, 2}), InputError);
+}
+
 TEST(WriteExperiment, WritesTableDetailsAndManifest) {
   const std::string folder = testing::TempDir() + "/feeler_experiment_test";
   std::filesystem::remove_all(folder);
@@ -49,6 +79,13 @@ TEST(WriteExperiment, WritesTableDetailsAndManifest) {
   const auto manifest = nlohmann::json::parse(manifest_file);
   for (const char* key : {"version", "command", "settings", "seeds", "machine"})
     EXPECT_TRUE(manifest.contains(key)) << key;
+  Figure figure{"f", "x", "y", true, false, {{"a", {{1, 2, 1.5, 2.5}}}}};
+  WriteExperiment(folder, "plot", {{"x"}, {}}, {}, {}, {figure});
+  std::ifstream plot_file(folder + "/plot.json");
+  const auto plot = nlohmann::json::parse(plot_file);
+  EXPECT_EQ(plot["figures"][0]["series"][0]["points"][0],
+            (nlohmann::json{{"x", 1.0}, {"y", 2.0}, {"low", 1.5}, {"high", 2.5}}));
+  EXPECT_EQ(plot["figures"][0]["x_log"], true);
   EXPECT_THROW(WriteExperiment(folder, "bad", {{"one"}, {{1, 2}}}, {}, {}), InputError);
   EXPECT_FALSE(std::filesystem::exists(folder + "/bad.csv"));
 }

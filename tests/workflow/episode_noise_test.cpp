@@ -128,6 +128,23 @@ INSTANTIATE_TEST_SUITE_P(Names, NoisyEpisode,
                            return text;
                          });
 
+TEST(ParseNoise, NumbersGrowOnTopOfPresets) {
+  const EpisodeNoise noise = ParseNoise("force-noise=2,joint-friction=5,stiffness=20000,yaw=1.5");
+  EXPECT_EQ(noise.robot.force_noise_n, 2.0);
+  EXPECT_GE(noise.robot.contact_threshold_n, 12.0) << "contacts are told from noise";
+  EXPECT_EQ(noise.robot.joint_friction_nm[0], 5.0);
+  EXPECT_EQ(noise.robot.joint_friction_nm[5], 2.0);
+  EXPECT_EQ(noise.robot.joint_stiffness_nm_rad, 20000.0);
+  EXPECT_NEAR(noise.yaw_error_rad, 0.0261799, 1e-6);
+  const EpisodeNoise none = ParseNoise("force-noise=0,joint-friction=0");
+  EXPECT_EQ(none.robot.contact_threshold_n, ParseNoise("ideal").robot.contact_threshold_n);
+  EXPECT_EQ(ParseNoise("force-noise=0.5,friction").robot.force_noise_n, 0.5) << "in any order";
+  for (const char* bad : {"force-noise=", "force-noise=-1", "force-noise=x", "yaw=nan", "loudness=3", "yaw=1,yaw-2",
+                          "yaw=1,yaw=1", "stiffness=0"}) {
+    EXPECT_THROW(ParseNoise(bad), InputError) << bad;
+  }
+}
+
 TEST(OversizeTarget, StandsFartherOutOnTheSidesOnly) {
   const auto scene = BuildEpisodeScene(*PlugSetup());
   const env::Scene grown = env::WithOversizeTarget(*scene, 0.0005);
