@@ -1,8 +1,9 @@
 // Every task file that ships. Laws:
 //   MuJoCo opens the file as it is;  the scene with the robot compiles;  the wall that lies nearest to a lattice plane
-//   is a tenth of a cell away at least, else an off-lattice truth reads as the wrong outcome;  the start is free of
-//   contact under every hypothesis of the largest problem, and every step from there is a move the map knows; aligned,
-//   the tool is stopped at the mouth by the lid and by nothing with the opening open.
+//   is a tenth of a cell away at least (of the target as estimated; turned ones have slanted walls), else an
+//   off-lattice truth reads as the wrong outcome;  the start is free of contact under every hypothesis of the largest
+//   problem, and every step from there is a move the map knows; aligned, the tool is stopped at the mouth by the lid
+//   and by nothing with the opening open.
 
 #include <gtest/gtest.h>
 #include <mujoco/mujoco.h>
@@ -38,8 +39,18 @@ TEST_P(EveryTask, OpensAndMakesAScene) {
   EXPECT_EQ(scene.lid_geoms.size(), task.lid_geoms.size() + task.tool_lid_geoms.size());
 }
 
+/// With the outermost angles only, where there are many: a map has a layer for each pair.
+TaskModel WithFewAngles(TaskModel task_model) {
+  for (UncertainAxis& axis : task_model.task.axes) {
+    if (!axis.angular() || axis.max_cells <= 2) continue;
+    axis.resolution *= axis.max_cells - 1;
+    axis.max_cells = 2;
+  }
+  return task_model;
+}
+
 TEST_P(EveryTask, WallsKeepOffTheLatticeAndTheStartIsFree) {
-  const TaskModel task_model = LoadTask(GetParam());
+  const TaskModel task_model = WithFewAngles(LoadTask(GetParam()));
   const Task& task = task_model.task;
   const planner::ContactMap map = BuildContactMap(task_model, Opening::kClosed);
   EXPECT_GE(map.margin_cells(), kLeastMargin_cells);
