@@ -35,7 +35,21 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["noise"] = record.noise;
   json["seed"] = record.seed;
   json["episode"] = record.episode;
+  json["placement"] = record.placement;
+  json["rejected_placements"] = record.rejected_placements;
+  json["truth_outside"] = record.truth_outside;
+  json["perception"] = nullptr;
+  if (record.perception) {
+    json["perception"] = {{"distance_m", record.perception->distance_m},
+                          {"fitness", record.perception->fitness},
+                          {"rms_m", record.perception->rms_m},
+                          {"points", record.perception->points}};
+  }
   json["extents"] = {record.extents.nx, record.extents.ny, record.extents.nz};
+  if (record.extents.n_yaw > 1 || record.extents.n_pitch > 1) {
+    json["extents"].push_back(record.extents.n_yaw);
+    json["extents"].push_back(record.extents.n_pitch);
+  }
   json["true_pose"] = PoseJson(record.world_T_true);
   json["start_estimate"] = PoseJson(record.world_T_estimate0);
   json["estimate"] =
@@ -63,12 +77,14 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["peak_force_n"] = record.peak_force_n;
   json["impulse_ns"] = record.impulse_ns;
   json["forbidden_contacts"] = record.forbidden_contacts;
+  json["pictures"] = execution.pictures;
   json["fell_in"] = execution.fell_in;
   json["ladder"] = nlohmann::ordered_json::array();
   for (const execution::LadderRecord& rung : execution.ladder) {
     json["ladder"].push_back({{"rung", rung.rung}, {"reason", rung.reason}});
   }
-  json["timing"] = {{"plan_cpu_s", record.timing.plan_cpu_s},
+  json["timing"] = {{"perception_cpu_s", record.perception ? record.perception->cpu_s : 0.0},
+                    {"plan_cpu_s", record.timing.plan_cpu_s},
                     {"transfer_cpu_s", record.timing.transfer_cpu_s},
                     {"cpu_s", record.timing.cpu_s}};
   if (record.replay) json["replay"] = ReplayJson(record);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/error.h"
 #include "env/exact_travel.h"
 #include "env/oversize_target.h"
 #include "workflow/cpu_clock.h"
@@ -17,7 +18,7 @@ PoseError ErrorOf(const Task& task, const Pose& world_T_true, const Pose& world_
   Eigen::Vector3d across = difference.translation();
   across[along] = 0.0;
   return {across.norm(), across.cwiseAbs().maxCoeff(), std::abs(difference.translation()[along]),
-          Eigen::AngleAxisd(difference.linear()).angle()};
+          InsertionAngle(task, difference.linear())};
 }
 
 bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
@@ -55,14 +56,56 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
   if (noise_.oversize_m > 0.0) {
     scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
   }
+  if (options_.perception) {
+    if (noise_.outside || noise_.fall_in || noise_.yaw_error_rad > 0.0) {
+      throw InputError("noise", "'" + noise_.name + "' says where the target stands, and so does perception",
+                       "leave out one of them");
+    }
+    options_.placement = Placement::kWorkspace;
+    camera_cell_ = std::make_unique<CameraCell>(scene, options_.perception->finder, options_.perception->noise);
+  } else if (options_.placement == Placement::kWorkspace) {
+    placements_ = std::make_unique<PlacementSampler>(scene);
+  }
   environment_ = std::make_unique<env::InsertionEnv>(std::move(scene));
   online_planner_ = std::make_shared<execution::OnlinePlanner>();
+}
+
+EpisodeDraw EpisodeRunner::Draw(std::uint64_t episode) {
+  if (camera_cell_) {
+    return DrawPerceived(setup_->task(), *options_.perception, options_.family, options_.seed, episode, *camera_cell_);
+  }
+  Task task = setup_->task();
+  PlacementDraw placement{task.world_T_target, 0};
+  if (placements_) {
+    RandomStream random(options_.seed, episode, "placement");
+    placement = placements_->Draw(random);
+  }
+  task.world_T_target = placement.world_T_target;
+  EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode, noise_);
+  draw.rejected_placements = placement.rejected;
+  return draw;
 }
 
 EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   const Task& task = setup_->task();
   const double cpu_start_s = ThreadCpuSeconds();
-  EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode, noise_);
+  EpisodeDraw draw = Draw(episode);
+  EpisodeRecord record;
+  record.task = task.name;
+  record.noise = noise_.name;
+  record.seed = options_.seed;
+  record.episode = episode;
+  record.placement = ToString(options_.placement);
+  record.rejected_placements = draw.rejected_placements;
+  record.extents = draw.extents;
+  record.world_T_true = draw.world_T_true;
+  record.world_T_estimate0 = draw.world_T_estimate;
+  record.perception = draw.perception;
+  if (!draw.failure.empty()) {
+    record.reason = draw.failure;
+    record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
+    return record;
+  }
   const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
   const double plan_start_s = ThreadCpuSeconds();
   const std::unique_ptr<policies::Policy> policy =
@@ -73,15 +116,8 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
     const auto truth = DrawFallIn(task, problem, *policy, draw.world_T_estimate, random);
     if (truth) draw.world_T_true = TurnedByNoise(task, noise_, options_.seed, episode, *truth);
   }
-
-  EpisodeRecord record;
-  record.task = task.name;
-  record.noise = noise_.name;
-  record.seed = options_.seed;
-  record.episode = episode;
-  record.extents = draw.extents;
   record.world_T_true = draw.world_T_true;
-  record.world_T_estimate0 = draw.world_T_estimate;
+  record.truth_outside = TruthOutside(task, draw);
 
   env::EpisodeOptions reset;
   reset.episode = episode;
@@ -146,6 +182,9 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
     record.reason = "believed inserted, but " + std::string(env::ToString(verdict.reason));
   } else {
     record.reason = record.execution.reason;
+  }
+  if (!record.inserted && draw.perception && record.truth_outside) {
+    record.reason = "truth outside the hypotheses: " + record.reason;
   }
   record.timing.plan_cpu_s = lookup_cpu_s + record.execution.policy_cpu_s;
   record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;

@@ -14,7 +14,9 @@
 #include "planner/preprocess/problem_family.h"
 #include "workflow/episode_draw.h"
 #include "workflow/episode_noise.h"
+#include "workflow/episode_perception.h"
 #include "workflow/episode_record.h"
+#include "workflow/placement_draw.h"
 #include "workflow/planning_setup.h"
 #include "workflow/policy_registry.h"
 
@@ -24,8 +26,11 @@ struct EpisodeOptions {
   std::uint64_t seed = 1;
   /// The problems an episode may meet, drawn uniformly; one problem: always that one.
   planner::ProblemFamily family;
-  std::string noise = "ideal";  ///< names of NoiseNames(), with commas between
-  bool ladder = true;           ///< fallbacks when the policy does not come to an insertion
+  /// Hypotheses come from a camera, which looks at a target placed in the workspace; null: they are drawn around it.
+  std::shared_ptr<const EpisodePerception> perception;
+  Placement placement = Placement::kNominal;  ///< where the target stands, before uncertainty comes into it
+  std::string noise = "ideal";                ///< names of NoiseNames(), with commas between
+  bool ladder = true;                         ///< fallbacks when the policy does not come to an insertion
   /// How well the position across the insertion must be known before the insertion; default: the executor's.
   std::optional<double> confirm_limit_m;
   /// Keep what the episode looked like in its record. Not for a robot that somebody else observes.
@@ -49,12 +54,16 @@ class EpisodeRunner {
   env::InsertionEnv& environment() { return *environment_; }
 
  private:
+  EpisodeDraw Draw(std::uint64_t episode);
+
   std::shared_ptr<const PlanningSetup> setup_;
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
   EpisodeNoise noise_;
   std::shared_ptr<execution::OnlinePlanner> online_planner_;
   std::unique_ptr<env::InsertionEnv> environment_;
+  std::unique_ptr<PlacementSampler> placements_;  ///< if the target is placed in the workspace
+  std::unique_ptr<CameraCell> camera_cell_;       ///< if a camera looks for it
 };
 
 /// The numbers first..end-1.

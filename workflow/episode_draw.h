@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/pose.h"
@@ -10,11 +12,23 @@
 
 namespace feeler::workflow {
 
+/// What the camera made of the target, where there is one.
+struct PerceptionDraw {
+  double distance_m = 0.0;  ///< of the true target from the camera
+  double fitness = 0.0;     ///< of the registration (perception/registration.h)
+  double rms_m = 0.0;
+  int points = 0;
+  double cpu_s = 0.0;  ///< measured
+};
+
 /// The draws of one episode: which problem is met, and where the target truly is.
 struct EpisodeDraw {
   planner::Extents extents;
   Pose world_T_estimate = Pose::Identity();  ///< what the episode is told: the nominal pose of the task
   Pose world_T_true = Pose::Identity();
+  int rejected_placements = 0;  ///< places drawn that the robot cannot serve, or the camera cannot see
+  std::optional<PerceptionDraw> perception;
+  std::string failure;  ///< why there is no episode (no target was found); empty if there is one
 };
 
 /// Hypotheses per axis of the task, in the order of its axes.

@@ -7,6 +7,7 @@
 #include "core/pose.h"
 #include "execution/execution_record.h"
 #include "planner/preprocess/problem_family.h"
+#include "workflow/episode_draw.h"
 #include "workflow/replay.h"
 
 namespace feeler::workflow {
@@ -26,6 +27,10 @@ struct EpisodeRecord {
   std::string noise;
   std::uint64_t seed = 0;
   std::uint64_t episode = 0;
+  std::string placement = "nominal";  ///< how the place of the target was drawn
+  int rejected_placements = 0;        ///< places drawn before it that the robot cannot serve, or the camera cannot see
+  std::optional<PerceptionDraw> perception;  ///< if the hypotheses come from a camera
+  bool truth_outside = false;                ///< the truth is none that the hypotheses stand for
   planner::Extents extents;
   Pose world_T_true = Pose::Identity();       ///< of the target
   Pose world_T_estimate0 = Pose::Identity();  ///< where the episode was told the target would be

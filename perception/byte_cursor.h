@@ -1,0 +1,137 @@
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace feeler::perception {
+
+/// The types of numbers that point files hold.
+enum class NumberType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat, kDouble };
+
+inline std::size_t SizeOf(NumberType type) {
+  switch (type) {
+    case NumberType::kInt8:
+    case NumberType::kUint8: return 1;
+    case NumberType::kInt16:
+    case NumberType::kUint16: return 2;
+    case NumberType::kInt32:
+    case NumberType::kUint32:
+    case NumberType::kFloat: return 4;
+    default: return 8;
+  }
+}
+
+/// Reads a file's bytes from front to back; running past the end throws InputError naming `where`.
+class ByteCursor {
+ public:
+  ByteCursor(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
+
+  std::size_t left() const { return bytes_.size() - at_; }
+
+  /// The next line without its end; at the end of the file an InputError.
+  std::string_view Line() {
+    if (left() == 0) Fail("is cut off");
+    const std::size_t end = bytes_.find('\n', at_);
+    std::string_view line = bytes_.substr(at_, end == std::string_view::npos ? end : end - at_);
+    at_ = end == std::string_view::npos ? bytes_.size() : end + 1;
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    return line;
+  }
+
+  /// The next word between spaces and line ends.
+  std::string_view Word() {
+    const auto space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
+    while (at_ < bytes_.size() && space(bytes_[at_])) ++at_;
+    const std::size_t start = at_;
+    while (at_ < bytes_.size() && !space(bytes_[at_])) ++at_;
+    if (start == at_) Fail("is cut off");
+    return bytes_.substr(start, at_ - start);
+  }
+
+  /// The next word as a number; "nan" and what overflows are no finite number.
+  double TextNumber() {
+    std::string_view word = Word();
+    if (word.size() > 1 && word.front() == '+') word.remove_prefix(1);
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::infinity();
+    if (error != std::errc() || end != word.data() + word.size()) {
+      Fail("holds '" + std::string(word.substr(0, 20)) + "' where a number should stand");
+    }
+    return value;
+  }
+
+  double BinaryNumber(NumberType type, bool big_endian) {
+    const std::size_t size = SizeOf(type);
+    if (left() < size) Fail("is cut off");
+    unsigned char raw[8] = {};
+    for (std::size_t i = 0; i < size; ++i) {
+      raw[big_endian ? size - 1 - i : i] = static_cast<unsigned char>(bytes_[at_ + i]);
+    }
+    at_ += size;
+    std::uint64_t bits = 0;  // little endian
+    for (std::size_t i = 0; i < size; ++i) bits |= std::uint64_t{raw[i]} << (8 * i);
+    switch (type) {
+      case NumberType::kInt8: return static_cast<std::int8_t>(bits);
+      case NumberType::kUint8: return static_cast<std::uint8_t>(bits);
+      case NumberType::kInt16: return static_cast<std::int16_t>(bits);
+      case NumberType::kUint16: return static_cast<std::uint16_t>(bits);
+      case NumberType::kInt32: return static_cast<std::int32_t>(bits);
+      case NumberType::kUint32: return static_cast<std::uint32_t>(bits);
+      case NumberType::kInt64: return static_cast<double>(static_cast<std::int64_t>(bits));
+      case NumberType::kUint64: return static_cast<double>(bits);
+      case NumberType::kFloat: {
+        const auto word = static_cast<std::uint32_t>(bits);
+        float value = 0.0F;
+        std::memcpy(&value, &word, sizeof value);
+        return double{value};
+      }
+      default: {
+        double value = 0.0;
+        std::memcpy(&value, &bits, sizeof value);
+        return value;
+      }
+    }
+  }
+
+  void Skip(std::size_t bytes) {
+    if (left() < bytes) Fail("is cut off");
+    at_ += bytes;
+  }
+
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw InputError(where_, what, "give a whole PLY or PCD file, coordinates in metres");
+  }
+
+ private:
+  std::string_view bytes_;
+  const std::string& where_;
+  std::size_t at_ = 0;
+};
+
+/// The words of a line.
+inline std::vector<std::string_view> Words(std::string_view line) {
+  std::vector<std::string_view> words;
+  for (std::size_t at = 0; at < line.size();) {
+    if (line[at] == ' ' || line[at] == '\t') {
+      ++at;
+      continue;
+    }
+    std::size_t end = at;
+    while (end < line.size() && line[end] != ' ' && line[end] != '\t') ++end;
+    words.push_back(line.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+}  // namespace feeler::perception

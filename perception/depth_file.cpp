@@ -1,0 +1,201 @@
+#include "perception/depth_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/error.h"
+#include "perception/input_file.h"
+
+namespace feeler::perception {
+namespace {
+
+constexpr int kLargestSide = 8192;
+constexpr char kSignature[] = "\x89PNG\r\n\x1a\n";
+
+std::uint32_t BigEndian(std::string_view bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+  return value;
+}
+
+std::uint32_t Crc(std::string_view bytes) {
+  static const std::array<std::uint32_t, 256> kTable = [] {
+    std::array<std::uint32_t, 256> table{};
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      std::uint32_t c = i;
+      for (int bit = 0; bit < 8; ++bit) c = (c & 1) != 0 ? 0xEDB88320U ^ (c >> 1) : c >> 1;
+      table[i] = c;
+    }
+    return table;
+  }();
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (const char c : bytes) crc = kTable[(crc ^ static_cast<unsigned char>(c)) & 0xFF] ^ (crc >> 8);
+  return crc ^ 0xFFFFFFFFU;
+}
+
+struct PngHeader {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  int bits = 0;
+  int color = 0;
+};
+
+/// Walks the chunks before the decoder sees them: libpng reports damage on stderr, and we say it ourselves.
+PngHeader CheckPng(std::string_view bytes, const std::string& where) {
+  const auto damaged = [&](const std::string& what) -> InputError {
+    return {where, what, "give a whole 16-bit grey PNG"};
+  };
+  if (bytes.substr(0, 8) != std::string_view(kSignature, 8)) throw damaged("is not a PNG file");
+  PngHeader header;
+  bool data = false;
+  for (std::size_t at = 8;;) {
+    if (bytes.size() - at < 12) throw damaged("is cut off");
+    const std::uint32_t length = BigEndian(bytes, at);
+    if (length > bytes.size() - at - 12) throw damaged("is cut off");
+    const std::string_view type = bytes.substr(at + 4, 4);
+    if (Crc(bytes.substr(at + 4, length + 4)) != BigEndian(bytes, at + 8 + length)) throw damaged("is damaged");
+    if (at == 8) {
+      if (type != "IHDR" || length != 13) throw damaged("has no header");
+      header = {BigEndian(bytes, 16), BigEndian(bytes, 20), static_cast<unsigned char>(bytes[24]),
+                static_cast<unsigned char>(bytes[25])};
+    }
+    if (type == "IDAT") data = true;
+    if (type == "IEND") break;
+    at += 12 + length;
+  }
+  if (!data) throw damaged("holds no picture");
+  return header;
+}
+
+}  // namespace
+
+CameraIntrinsics ParseIntrinsics(std::string_view json, const std::string& where) {
+  const nlohmann::json root = ParseJson(json, where);
+  CameraIntrinsics camera;
+  camera.width = IntegerAt(root, "width", 2, kLargestSide, where);
+  camera.height = IntegerAt(root, "height", 2, kLargestSide, where);
+  camera.fx = NumberAt(root, "fx", 1.0, 1e6, where);
+  camera.fy = NumberAt(root, "fy", 1.0, 1e6, where);
+  camera.cx = NumberAt(root, "cx", -1e6, 1e6, where);
+  camera.cy = NumberAt(root, "cy", -1e6, 1e6, where);
+  if (root.contains("depth_scale_m")) camera.depth_scale_m = NumberAt(root, "depth_scale_m", 1e-6, 1.0, where);
+  if (root.contains("world_T_camera")) camera.world_T_camera = PoseAt(root, "world_T_camera", where);
+  return camera;
+}
+
+std::string ToJson(const CameraIntrinsics& camera) {
+  nlohmann::ordered_json json = {{"width", camera.width},
+                                 {"height", camera.height},
+                                 {"fx", camera.fx},
+                                 {"fy", camera.fy},
+                                 {"cx", camera.cx},
+                                 {"cy", camera.cy},
+                                 {"depth_scale_m", camera.depth_scale_m}};
+  json["world_T_camera"] = PoseJson(camera.world_T_camera);
+  return json.dump(2) + "\n";
+}
+
+DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera, const std::string& where) {
+  const PngHeader header = CheckPng(bytes, where);
+  if (header.bits != 16 || header.color != 0) {
+    throw InputError(where,
+                     fmt::format("is not a 16-bit grey PNG ({} bits, colour type {})", header.bits, header.color),
+                     "write depths as 16-bit grey");
+  }
+  if (header.width != static_cast<std::uint32_t>(camera.width) ||
+      header.height != static_cast<std::uint32_t>(camera.height)) {
+    throw InputError(
+        where,
+        fmt::format("has {} x {} pixels, the camera {} x {}", header.width, header.height, camera.width, camera.height),
+        "give the intrinsics of this image");
+  }
+  cv::Mat image;
+  try {
+    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
+    image = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    image = cv::Mat();
+  }
+  if (image.empty() || image.type() != CV_16UC1 || image.cols != camera.width || image.rows != camera.height) {
+    throw InputError(where, "is damaged", "give a whole 16-bit grey PNG");
+  }
+  DepthFrame frame{camera.width, camera.height, {}};
+  frame.depth_m.reserve(static_cast<std::size_t>(image.total()));
+  float nearest = INFINITY;
+  float farthest = 0.0F;
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const auto depth = static_cast<float>(image.at<std::uint16_t>(row, column) * camera.depth_scale_m);
+      frame.depth_m.push_back(depth);
+      if (depth == 0.0F) continue;
+      nearest = std::min(nearest, depth);
+      farthest = std::max(farthest, depth);
+    }
+  }
+  if (farthest > 0.0F && (farthest < 0.02F || nearest > 50.0F)) {
+    throw InputError(where, fmt::format("depths from {:.4g} to {:.4g} m", nearest, farthest),
+                     "set depth_scale_m of the intrinsics to the metres per unit");
+  }
+  return frame;
+}
+
+std::string EncodeDepthPng(const DepthFrame& frame, double depth_scale_m) {
+  if (frame.depth_m.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height) ||
+      frame.depth_m.empty()) {
+    throw InputError("depth image", "is empty");
+  }
+  cv::Mat image(frame.height, frame.width, CV_16UC1);
+  for (int row = 0; row < frame.height; ++row) {
+    for (int column = 0; column < frame.width; ++column) {
+      const double units = std::round(
+          static_cast<double>(frame.depth_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.width) +
+                                            static_cast<std::size_t>(column)]) /
+          depth_scale_m);
+      image.at<std::uint16_t>(row, column) =
+          units > 0.0 && units <= 65535.0 ? static_cast<std::uint16_t>(units) : std::uint16_t{0};
+    }
+  }
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", image, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+Points ToPoints(const DepthFrame& frame, const CameraIntrinsics& camera, const CloudOptions& options,
+                const DepthFrame* background) {
+  const auto same_size = [&](const DepthFrame& f) {
+    return f.width == camera.width && f.height == camera.height &&
+           f.depth_m.size() == static_cast<std::size_t>(f.width) * static_cast<std::size_t>(f.height);
+  };
+  if (!same_size(frame) || (background != nullptr && !same_size(*background))) {
+    throw InputError("depth image", "its size is not that of the camera", "give the intrinsics of this image");
+  }
+  const auto width = static_cast<std::size_t>(frame.width);
+  Points points;
+  for (int row = 1; row + 1 < frame.height; ++row) {
+    for (int column = 1; column + 1 < frame.width; ++column) {
+      const std::size_t at = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
+      const double depth = frame.depth_m[at];
+      if (!(depth > 0.0) || !std::isfinite(depth)) continue;
+      if (background != nullptr) {
+        const double behind = background->depth_m[at];
+        if (behind > 0.0 && depth > behind - options.background_margin_m) continue;
+      }
+      int neighbours = 0;
+      for (const std::size_t other :
+           {at - width - 1, at - width, at - width + 1, at - 1, at + 1, at + width - 1, at + width, at + width + 1}) {
+        neighbours += std::abs(frame.depth_m[other] - depth) < options.same_surface_m ? 1 : 0;
+      }
+      if (neighbours < options.least_neighbours) continue;
+      points.push_back(camera.world_T_camera * Eigen::Vector3d((column - camera.cx) / camera.fx * depth,
+                                                               (row - camera.cy) / camera.fy * depth, depth));
+    }
+  }
+  return points;
+}
+
+}  // namespace feeler::perception

@@ -1,0 +1,83 @@
+#include "perception/point_cloud.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+namespace feeler::perception {
+namespace {
+
+using Key = std::array<std::int64_t, 3>;
+
+/// Indices of the points, those of a cube next to each other, cubes in order; ties in order of the points' own place.
+std::vector<std::pair<Key, std::size_t>> ByCube(const Points& points, double cell_m) {
+  std::vector<std::pair<Key, std::size_t>> order;
+  order.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Key key;
+    for (int axis = 0; axis < 3; ++axis) {
+      key[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(points[i][axis] / cell_m));
+    }
+    order.emplace_back(key, i);
+  }
+  const auto before = [&](const auto& a, const auto& b) {
+    if (a.first != b.first) return a.first < b.first;
+    const Eigen::Vector3d& p = points[a.second];
+    const Eigen::Vector3d& q = points[b.second];
+    return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
+  };
+  std::sort(order.begin(), order.end(), before);
+  return order;
+}
+
+/// Calls `visit(first, last)` for the run of each cube.
+template <class Visit>
+void ForEachCube(const std::vector<std::pair<Key, std::size_t>>& order, const Visit& visit) {
+  for (std::size_t first = 0; first < order.size();) {
+    std::size_t last = first;
+    while (last < order.size() && order[last].first == order[first].first) ++last;
+    visit(first, last);
+    first = last;
+  }
+}
+
+}  // namespace
+
+Points Thinned(const Points& points, double cell_m) {
+  const auto order = ByCube(points, cell_m);
+  Points thinned;
+  ForEachCube(order, [&](std::size_t first, std::size_t last) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = first; i < last; ++i) sum += points[order[i].second];
+    thinned.push_back(sum / static_cast<double>(last - first));
+  });
+  return thinned;
+}
+
+SurfacePoints Thinned(const SurfacePoints& surface, double cell_m) {
+  const auto order = ByCube(surface.points, cell_m);
+  SurfacePoints thinned;
+  ForEachCube(order, [&](std::size_t first, std::size_t last) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for (std::size_t i = first; i < last; ++i) {
+      sum += surface.points[order[i].second];
+      normal += surface.normals[order[i].second];
+    }
+    constexpr double kCancelled = 0.9;  // of the number of points: an edge between two faces
+    const auto count = static_cast<double>(last - first);
+    if (normal.norm() < kCancelled * count) {
+      thinned.points.push_back(surface.points[order[first].second]);
+      thinned.normals.push_back(surface.normals[order[first].second]);
+    } else {
+      thinned.points.push_back(sum / count);
+      thinned.normals.push_back(normal.normalized());
+    }
+  });
+  return thinned;
+}
+
+}  // namespace feeler::perception

@@ -1,0 +1,138 @@
+// Laws: registration recovers a known pose from noisy points, wherever the target stands (oracle: the pose that made
+// the scene); a rigid motion of camera, scene and nominal orientation moves the result along; the order of points does
+// not matter, bit for bit; points that are not finite do not either; other things beside the target do not draw it
+// away; nothing, too little, and something else than the target are "not found", with a reason.
+#include "perception/registration.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "tests/perception/synthetic_target.h"
+
+namespace feeler::perception {
+namespace {
+
+const Eigen::Vector3d kEye(1.4, -0.5, 1.2);
+const Eigen::Matrix3d kUpright = Eigen::Matrix3d::Identity();
+
+const TargetModel& Model() {
+  static const TargetModel kModel(SyntheticSurface(0.003));
+  return kModel;
+}
+
+Pose DrawPose(RandomStream& random) {
+  const Eigen::Vector3d position(random.Uniform(0.3, 0.9), random.Uniform(-0.4, 0.4), random.Uniform(0.1, 0.5));
+  return MakePose(position, random.Uniform(-15.0, 15.0) * std::numbers::pi / 180.0);
+}
+
+double Turn(const Pose& a, const Pose& b) { return Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle(); }
+
+TEST(Registration, RecoversAKnownPose) {
+  RandomStream random(1, 0, "poses");
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    const Pose truth = DrawPose(random);
+    const Registration found = Register(SyntheticScene(truth, kEye, 0.002, k), Model(), kUpright, kEye);
+    ASSERT_TRUE(found.found) << found.reason;
+    EXPECT_LT((found.world_T_target.translation() - truth.translation()).norm(), 0.0015) << k;
+    EXPECT_LT(Turn(found.world_T_target, truth), 0.005) << k;
+    EXPECT_GT(found.fitness, 0.9);
+    ASSERT_EQ(found.covariance.rows(), 4);
+    for (int i = 0; i < 4; ++i) EXPECT_GT(found.covariance(i, i), 0.0);
+  }
+}
+
+TEST(Registration, TwoAnglesAreRecoveredWhereTwoAreUncertain) {
+  RegistrationOptions options;
+  options.rotation_axes = {Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY()};
+  Pose truth = MakePose(Eigen::Vector3d(0.6, 0.1, 0.3), 0.12);
+  truth.linear() = truth.linear() * Eigen::AngleAxisd(-0.08, Eigen::Vector3d::UnitY());
+  const Registration found = Register(SyntheticScene(truth, kEye, 0.001, 3), Model(), kUpright, kEye, options);
+  ASSERT_TRUE(found.found) << found.reason;
+  EXPECT_LT((found.world_T_target.translation() - truth.translation()).norm(), 0.0015);
+  EXPECT_LT(Turn(found.world_T_target, truth), 0.006);
+  EXPECT_EQ(found.covariance.rows(), 5);
+}
+
+TEST(Registration, MovesAlongWithCameraAndScene) {
+  RandomStream random(2, 0, "poses");
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    const Pose truth = DrawPose(random);
+    const Points scene = SyntheticScene(truth, kEye, 0.002, k);
+    const Registration here = Register(scene, Model(), kUpright, kEye);
+    Pose motion = MakePose(Eigen::Vector3d(-0.7, 0.4, 0.9), 1.0 + static_cast<double>(k));
+    motion.linear() = motion.linear() * Eigen::AngleAxisd(0.6, Eigen::Vector3d::UnitX());
+    Points moved;
+    for (const Eigen::Vector3d& p : scene) moved.push_back(motion * p);
+    const Registration there = Register(moved, Model(), motion.linear() * kUpright, motion * kEye);
+    ASSERT_TRUE(here.found && there.found);
+    const Pose expected = motion * here.world_T_target;
+    // The scene is thinned on another grid, so the noise averages differently.
+    EXPECT_LT((there.world_T_target.translation() - expected.translation()).norm(), 0.001);
+    EXPECT_LT(Turn(there.world_T_target, expected), 0.004);
+  }
+}
+
+TEST(Registration, OrderAndBrokenPointsDoNotMatter) {
+  const Pose truth = MakePose(Eigen::Vector3d(0.5, 0.2, 0.25), -0.2);
+  const Points scene = SyntheticScene(truth, kEye, 0.002, 5);
+  Points shuffled = scene;
+  RandomStream random(5, 0, "shuffle");
+  for (std::size_t i = shuffled.size(); i > 1; --i) std::swap(shuffled[i - 1], shuffled[random.Index(i)]);
+  for (int i = 0; i < 50; ++i) {
+    shuffled.insert(shuffled.begin() + 7 * i, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    shuffled.emplace_back(0.0, std::numeric_limits<double>::infinity(), 1e300);
+  }
+  EXPECT_EQ(Register(scene, Model(), kUpright, kEye).world_T_target.matrix(),
+            Register(shuffled, Model(), kUpright, kEye).world_T_target.matrix());
+}
+
+TEST(Registration, OtherThingsDoNotDrawItAway) {
+  const Pose truth = MakePose(Eigen::Vector3d(0.5, 0.2, 0.25), 0.1);
+  Points scene = SyntheticScene(truth, kEye, 0.002, 6);
+  RandomStream random(6, 0, "clutter");
+  for (int i = 0; i < 6000; ++i) {  // a denser thing: a post
+    const double angle = random.Uniform(0.0, 2.0 * std::numbers::pi);
+    scene.emplace_back(0.2 + 0.06 * std::cos(angle), -0.3 + 0.06 * std::sin(angle), random.Uniform(0.0, 0.8));
+  }
+  for (int i = 0; i < 300; ++i) {  // flying pixels
+    scene.emplace_back(random.Uniform(0.2, 1.0), random.Uniform(-0.5, 0.5), random.Uniform(0.0, 0.8));
+  }
+  const Registration found = Register(scene, Model(), kUpright, kEye);
+  ASSERT_TRUE(found.found) << found.reason;
+  EXPECT_LT((found.world_T_target.translation() - truth.translation()).norm(), 0.003);
+}
+
+TEST(Registration, WhatIsNotThereIsNotFound) {
+  const auto reason = [](const Points& scene) {
+    const Registration result = Register(scene, Model(), kUpright, kEye);
+    EXPECT_FALSE(result.found);
+    return result.reason;
+  };
+  EXPECT_NE(reason({}), "");
+  EXPECT_NE(reason({Eigen::Vector3d(0.5, 0, 0.2)}), "");
+  EXPECT_NE(reason(Points(5000, Eigen::Vector3d(0.5, 0, 0.2))), "");
+  Points post;
+  RandomStream random(7, 0, "post");
+  for (int i = 0; i < 4000; ++i) {
+    const double angle = random.Uniform(0.0, 2.0 * std::numbers::pi);
+    post.emplace_back(0.5 + 0.03 * std::cos(angle), 0.03 * std::sin(angle), random.Uniform(0.0, 0.3));
+  }
+  EXPECT_NE(reason(post), "");
+}
+
+TEST(Registration, NonsenseIsRefused) {
+  RegistrationOptions options;
+  options.rotation_axes = {Eigen::Vector3d(1, 1, 0)};
+  EXPECT_THROW(Register({}, Model(), kUpright, kEye, options), InputError);
+  EXPECT_THROW(TargetModel(SurfacePoints{}), InputError);
+}
+
+}  // namespace
+}  // namespace feeler::perception

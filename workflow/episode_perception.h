@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/task.h"
+#include "env/sensing/depth_noise.h"
+#include "perception/uncertainty_table.h"
+#include "planner/preprocess/problem_family.h"
+#include "workflow/episode_draw.h"
+#include "workflow/perceive.h"
+
+namespace feeler::workflow {
+
+/// What an episode needs to get its hypotheses from a camera. Immutable; share it between runners.
+struct EpisodePerception {
+  std::shared_ptr<const TargetFinder> finder;
+  perception::UncertaintyTable table;
+  env::DepthNoiseOptions noise;
+};
+
+/// Episode k of a seed as a camera sees it: a target somewhere in the workspace that robot and camera can serve; a
+/// picture of it; its registration; the table's cuboid about that, as the smallest problem of the family that covers
+/// it. The camera is mounted once for all episodes of a seed. The draw fails, with the reason, where the target is not
+/// found or the family has no such problem.
+EpisodeDraw DrawPerceived(const Task& task, const EpisodePerception& perception, const planner::ProblemFamily& family,
+                          std::uint64_t seed, std::uint64_t episode, CameraCell& cell);
+
+/// Whether the true position is none that the hypotheses stand for: on some uncertain axis beyond half a cell of the
+/// outermost of them (the only failure of the paper's experiment).
+bool TruthOutside(const Task& task, const EpisodeDraw& draw);
+
+}  // namespace feeler::workflow
