@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "evaluation/episode_json.h"
 #include "evaluation/experiments/cell_store.h"
+#include "evaluation/report/scene_geometry.h"
 #include "planner/preprocess/problem_family.h"
 #include "workflow/database_builder.h"
 #include "workflow/episode.h"
@@ -62,6 +63,8 @@ json ToJson(const EpisodeSetting& setting) {
           {"policy", setting.policy},
           {"cost", setting.cost},
           {"extents", setting.extents},
+          {"placement", setting.placement},
+          {"policy_options", setting.policy_options},
           {"noise", setting.noise},
           {"ladder", setting.ladder},
           {"bare_of", setting.bare_of},
@@ -74,7 +77,7 @@ EpisodeStatistics StatisticsOf(const std::vector<json>& records) {
   int inserted = 0;
   int localized = 0;
   int ladder_used = 0;
-  std::vector<double> times, errors, moves, contacts, paths, cpu;
+  std::vector<double> times, errors, moves, contacts, paths, inserted_paths, forces, impulses, forbidden, plan, cpu;
   statistics.failures = json::object();
   for (const json& record : records) {
     localized += record.at("localized").get<bool>() ? 1 : 0;
@@ -82,6 +85,7 @@ EpisodeStatistics StatisticsOf(const std::vector<json>& records) {
     if (record.at("inserted").get<bool>()) {
       ++inserted;
       times.push_back(record.at("sim_time_s").get<double>());
+      inserted_paths.push_back(record.at("path_length_m").get<double>());
     } else {
       const std::string reason = record.at("reason").get<std::string>();
       json& count = statistics.failures[reason.substr(0, reason.find(':'))];
@@ -92,6 +96,11 @@ EpisodeStatistics StatisticsOf(const std::vector<json>& records) {
     moves.push_back(record.at("policy_moves").get<double>());
     contacts.push_back(record.at("contacts").get<double>());
     paths.push_back(record.at("path_length_m").get<double>());
+    forces.push_back(record.at("peak_force_n").get<double>());
+    impulses.push_back(record.value("impulse_ns", 0.0));
+    forbidden.push_back(record.value("forbidden_contacts", 0.0));
+    plan.push_back(record.at("timing").value("plan_cpu_s", 0.0));
+    statistics.rejected_placements += record.value("rejected_placements", 0);
     cpu.push_back(record.at("timing").at("cpu_s").get<double>());
     statistics.peak_force_max_n = std::max(statistics.peak_force_max_n, record.at("peak_force_n").get<double>());
   }
@@ -100,7 +109,13 @@ EpisodeStatistics StatisticsOf(const std::vector<json>& records) {
   statistics.localized = WilsonRate(localized, count);
   statistics.ladder_used = WilsonRate(ladder_used, count);
   statistics.sim_time_mean_s = Mean(times);
-  statistics.sim_time_median_s = Median(times);
+  statistics.sim_time = BootstrapMedian(times);
+  statistics.sim_time_median_s = statistics.sim_time.value;
+  statistics.path_length = BootstrapMedian(inserted_paths);
+  statistics.peak_force = BootstrapMedian(forces);
+  statistics.impulse_median_ns = Median(impulses);
+  statistics.forbidden_contacts_mean = Mean(forbidden);
+  statistics.plan_cpu_mean_s = Mean(plan);
   statistics.sim_time_max_s = times.empty() ? 0.0 : *std::max_element(times.begin(), times.end());
   statistics.lateral_error_median_m = Median(errors);
   statistics.lateral_error_p95_m = Quantile(errors, 0.95);
@@ -131,6 +146,8 @@ bool EpisodeSweep::Run() {
   for (const EpisodeSetting& setting : settings_) {
     total += setting.episodes;
     workflow::ParseNoise(setting.noise);
+    workflow::UsesLadder(setting.policy);  // an unknown policy fails before the first episode
+    workflow::ParsePolicyOptions(setting.policy_options);
     const std::pair group{setting.task, setting.cost};
     if (std::find(groups.begin(), groups.end(), group) == groups.end()) groups.push_back(group);
   }
@@ -159,13 +176,15 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
   TaskWorld world;
   world.setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
 
-  planner::ProblemFamily needed;
+  std::vector<planner::ProblemFamily> families;
+  std::string spec;
   std::set<std::string> seen;
   for (const EpisodeSetting& setting : settings_) {
     if (setting.task != task || setting.cost != cost || !seen.insert(setting.extents).second) continue;
-    needed.problems.push_back(planner::ParseExtents(setting.extents));
-    needed.spec += (needed.spec.empty() ? "" : ",") + setting.extents;
+    families.push_back(planner::ParseProblemFamily(setting.extents, world.setup->task()));
+    spec += (spec.empty() ? "" : ",") + setting.extents;
   }
+  const planner::ProblemFamily needed = planner::UnionOf(families, spec);
   workflow::RequireWithinTask(needed, world.setup->task());
   planner::PreprocessOptions build;
   build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
@@ -190,6 +209,7 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
   const std::string file = RecordsFile(setting);
   const auto first = static_cast<std::int64_t>(ReadFinished(file, setting, request_.seed).size());
   std::ofstream out(file, std::ios::app);
+  WriteSceneFile(*world.scene, request_.out + "/" + experiment_);
   const auto require_written = [&] {
     if (!out) throw InputError(file, "cannot be written", "check the folder and its free space");
   };
@@ -216,12 +236,14 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
 
   workflow::EpisodeOptions options;
   options.seed = request_.seed;
-  options.family = {{planner::ParseExtents(setting.extents)}, setting.extents};
+  options.family = planner::ParseProblemFamily(setting.extents, world.setup->task());
+  options.placement = workflow::ParsePlacement(setting.placement);
   options.noise = setting.noise;
   options.ladder = setting.ladder && workflow::UsesLadder(setting.policy);
   options.confirm_limit_m = setting.confirm_limit_m;
   options.replay = true;
-  const workflow::PolicyFactory factory = workflow::MakePolicyFactory(setting.policy, world.database);
+  const workflow::PolicyFactory factory =
+      workflow::MakePolicyFactory(setting.policy, world.database, workflow::ParsePolicyOptions(setting.policy_options));
   take_over();
   workflow::RunEpisodes(
       episodes, request_.jobs, [&] { return workflow::EpisodeRunner(world.setup, world.scene, factory, options); },

@@ -17,7 +17,10 @@ struct EpisodeSetting {
   std::string task = "plug";
   std::string policy = "database";
   std::string cost = "distance";  ///< or "time": what the policies of the database were made to save
-  std::string extents;            ///< the problem that every episode has, e.g. "7x7x7"
+  /// The problem that every episode has, e.g. "7x7x7", or a family from which each draws one, "2..15x2..15x2..15".
+  std::string extents;
+  std::string placement = "nominal";        ///< of the target: "nominal" or "workspace"
+  std::vector<std::string> policy_options;  ///< KEY=VALUE (workflow::ParsePolicyOptions)
   std::string noise = "ideal";
   bool ladder = true;
   /// Name of an earlier setting that differs in `ladder = true` alone: an episode in which it used no fallback is the
@@ -35,12 +38,19 @@ struct EpisodeStatistics {
   Rate ladder_used;  ///< episodes in which a fallback was tried
   double sim_time_mean_s = 0.0;
   double sim_time_median_s = 0.0;
+  Estimate sim_time;                    ///< median, inserted episodes
   double sim_time_max_s = 0.0;          ///< these three over inserted episodes
   double lateral_error_median_m = 0.0;  ///< of the final estimate, across the insertion axis, where there is one
   double lateral_error_p95_m = 0.0;
   double moves_mean = 0.0;
   double contacts_mean = 0.0;
   double path_length_mean_m = 0.0;
+  Estimate path_length;  ///< median, inserted episodes, m
+  Estimate peak_force;   ///< median, all episodes, N
+  double impulse_median_ns = 0.0;
+  double forbidden_contacts_mean = 0.0;
+  double plan_cpu_mean_s = 0.0;  ///< online planning of an episode; measured
+  int rejected_placements = 0;   ///< places that the robot cannot serve, drawn on the way to those of the episodes
   double peak_force_max_n = 0.0;
   double cpu_mean_s = 0.0;           ///< measured: differs from run to run
   nlohmann::json failures;           ///< reason -> episodes not inserted

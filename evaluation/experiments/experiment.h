@@ -33,7 +33,8 @@ struct ExperimentResult {
   std::vector<std::uint64_t> seeds;
   ResultTable table;
   nlohmann::json details;
-  std::string text;  ///< the table for people, beside the paper's printed values
+  std::vector<Figure> figures;  ///< line plots for the report
+  std::string text;             ///< the table for people, beside the paper's printed values
 };
 
 /// One of the paper's tables or figures, or a further one.

@@ -7,8 +7,13 @@
 #include "evaluation/experiments/acceptance_contact_maps.h"
 #include "evaluation/experiments/acceptance_guarded_moves.h"
 #include "evaluation/experiments/acceptance_transfers.h"
+#include "evaluation/experiments/baselines.h"
 #include "evaluation/experiments/bounds.h"
+#include "evaluation/experiments/figure_tbl.h"
+#include "evaluation/experiments/noise.h"
+#include "evaluation/experiments/spiral_tuning.h"
 #include "evaluation/experiments/table1_plug.h"
+#include "evaluation/experiments/table2_framework.h"
 #include "evaluation/experiments/table3_ablation.h"
 
 namespace feeler::evaluation {
@@ -26,9 +31,18 @@ const std::vector<Experiment>& Experiments() {
       {kAcceptanceGuardedMovesName, "guarded moves in physics against geometry", RunAcceptanceGuardedMoves},
       {kAcceptanceTransfersName, "transfers among obstacles in four scenes: planned, and carried out in physics",
        RunAcceptanceTransfers},
+      {kBaselinesName,
+       "all policies over the same episodes and sockets as uncertainty grows: success, time, path, force",
+       RunBaselines},
       {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds, true},
+      {kFigureTblName, "planning time and relative cost of touch-based localization against the number of hypotheses",
+       RunFigureTbl, true},
+      {kNoiseName, "sensor noise, joint friction and stiffness, a turned target: what breaks first", RunNoise},
+      {kSpiralTuningName, "pitch, speed and force of the spiral search, per socket", RunSpiralTuning},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
        true},
+      {kTable2FrameworkName, "Table II: success and execution time, targets anywhere in the workspace",
+       RunTable2Framework},
       {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",
        RunTable3Ablation, true, true},
   };
@@ -65,7 +79,7 @@ ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRe
   Manifest manifest{request.command, result.settings, result.seeds};
   manifest.settings["jobs"] = request.jobs.threads();
   result.details["manifest"] = ManifestJson(manifest);
-  WriteExperiment(request.out, experiment.name, result.table, result.details, manifest);
+  WriteExperiment(request.out, experiment.name, result.table, result.details, manifest, result.figures);
   return outcome;
 }
 
