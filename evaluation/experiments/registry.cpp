@@ -15,6 +15,7 @@
 #include "evaluation/experiments/table1_plug.h"
 #include "evaluation/experiments/table2_framework.h"
 #include "evaluation/experiments/table3_ablation.h"
+#include "evaluation/experiments/visual_servoing.h"
 
 namespace feeler::evaluation {
 
@@ -45,6 +46,8 @@ const std::vector<Experiment>& Experiments() {
        RunTable2Framework},
       {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",
        RunTable3Ablation, true, true},
+      {kVisualServoingName, "visual servoing in four scenes, by SIFT features and by the corners of red tape",
+       RunVisualServoing},
   };
   return kExperiments;
 }
