@@ -1,5 +1,6 @@
 #include "planner/solver/freeze_policy.h"
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <map>
@@ -93,7 +94,8 @@ Policy FreezePolicy(BeliefGraph& graph, const std::function<GuardedMove(BeliefId
   return Freezer(graph, move_of).Run();
 }
 
-bool StaysInWorkspace(const Problem& problem, const Policy& policy) {
+std::vector<char> NodesThatLeaveWorkspace(const Problem& problem, const Policy& policy) {
+  std::vector<char> leaves(policy.nodes.size(), 0);
   // The cells of a node depend on how it is reached, relative to its frame; follow each distinct pair once.
   struct Place {
     std::uint32_t node;
@@ -108,12 +110,17 @@ bool StaysInWorkspace(const Problem& problem, const Policy& policy) {
     const PolicyNode& node = policy.nodes[place.node];
     if (node.is_leaf()) continue;
     const Cell step = UnitCell(node.move.direction);
-    if (!problem.workspace.Contains(place.robot + node.move.cells * step)) return false;
+    if (!problem.workspace.Contains(place.robot + node.move.cells * step)) leaves[place.node] = 1;
     for (const PolicyBranch& branch : node.branches) {
       open.push_back({branch.next, place.robot + branch.outcome.cells * step});
     }
   }
-  return true;
+  return leaves;
+}
+
+bool StaysInWorkspace(const Problem& problem, const Policy& policy) {
+  const std::vector<char> leaves = NodesThatLeaveWorkspace(problem, policy);
+  return std::ranges::none_of(leaves, [](char out) { return out != 0; });
 }
 
 }  // namespace feeler::planner

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "planner/belief/belief_graph.h"
 #include "planner/solver/policy.h"
@@ -11,6 +12,8 @@ namespace feeler::planner {
 /// summed exactly; the lower bound is left zero.
 Policy FreezePolicy(BeliefGraph& graph, const std::function<GuardedMove(BeliefId)>& move_of);
 
+/// Per node: 1 if its move leaves the problem's workspace from some place where it is reached.
+std::vector<char> NodesThatLeaveWorkspace(const Problem& problem, const Policy& policy);
 /// True if every move stays in the problem's workspace (for graphs that took it to be unbounded).
 bool StaysInWorkspace(const Problem& problem, const Policy& policy);
 

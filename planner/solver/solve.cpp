@@ -11,6 +11,7 @@
 #include "planner/solver/bounded_search.h"
 #include "planner/solver/experience.h"
 #include "planner/solver/fewest_moves.h"
+#include "planner/solver/fit_workspace.h"
 #include "planner/solver/freeze_policy.h"
 #include "planner/solver/greedy_completion.h"
 #include "planner/solver/indistinguishable.h"
@@ -265,6 +266,15 @@ SolverResult Solve(const Problem& problem, const SolverOptions& options, std::sh
   }
   SolverResult result = Attempt(problem, options, *tables, experience, canonical).Run();
   if (canonical && result.policy && !StaysInWorkspace(problem, *result.policy)) {
+    // Further actions may cost something: what was promised must still hold.
+    const double factor = options.solver == SolverKind::kCertified ? options.gap : options.epsilon;
+    std::optional<Policy> fitted = FitIntoWorkspace(problem, *result.policy);
+    if (fitted && (fitted->expected_cost <= result.expected_cost * (1.0 + 1e-12) ||
+                   fitted->expected_cost <= factor * result.lower_bound)) {
+      result.expected_cost = fitted->expected_cost;
+      result.policy = std::move(fitted);
+      return result;
+    }
     result = Attempt(problem, options, *tables, experience, false).Run();
   }
   return result;
