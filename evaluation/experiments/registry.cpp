@@ -11,10 +11,12 @@
 #include "evaluation/experiments/bounds.h"
 #include "evaluation/experiments/figure_tbl.h"
 #include "evaluation/experiments/noise.h"
+#include "evaluation/experiments/perception.h"
 #include "evaluation/experiments/spiral_tuning.h"
 #include "evaluation/experiments/table1_plug.h"
 #include "evaluation/experiments/table2_framework.h"
 #include "evaluation/experiments/table3_ablation.h"
+#include "evaluation/experiments/table4_pipe.h"
 #include "evaluation/experiments/visual_servoing.h"
 
 namespace feeler::evaluation {
@@ -39,6 +41,8 @@ const std::vector<Experiment>& Experiments() {
       {kFigureTblName, "planning time and relative cost of touch-based localization against the number of hypotheses",
        RunFigureTbl, true},
       {kNoiseName, "sensor noise, joint friction and stiffness, a turned target: what breaks first", RunNoise},
+      {kPerceptionName, "registration and uncertainty table over the workspace: errors, coverage, hypotheses",
+       RunPerception},
       {kSpiralTuningName, "pitch, speed and force of the spiral search, per socket", RunSpiralTuning},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
        true},
@@ -46,6 +50,8 @@ const std::vector<Experiment>& Experiments() {
        RunTable2Framework},
       {kTable3AblationName, "Table III: rollout against naive experience, uncertainty against random order",
        RunTable3Ablation, true, true},
+      {kTable4PipeName, "Table IV: RTDP-Bel against E-RTDP-Bel on the pipe, and the fast setting", RunTable4Pipe, true,
+       true},
       {kVisualServoingName, "visual servoing in four scenes, by SIFT features and by the corners of red tape",
        RunVisualServoing},
   };

@@ -152,8 +152,9 @@ std::string SolverSweep::CellOf(const SolverRow& row, std::uint64_t seed, const 
 std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const planner::SolverOptions& options) {
   auto& tables = tables_[options.heuristic];
   if (!tables) {
-    const planner::Problem problem = planner::MakeCuboidProblem(case_.task, case_.map, sample_.problems.front());
-    tables = planner::BuildPlanningTables(problem, options);
+    const planner::Problem problem =
+        planner::MakeCuboidProblem(case_.task, case_.map, planner::LargestExtents(sample_));
+    tables = planner::BuildPlanningTables(problem, options, context_.jobs);
   }
   return tables;
 }
