@@ -1,0 +1,54 @@
+// Policies found as if the workspace were unbounded, made to stay in a tight one. Laws: the result is a valid policy of
+// the tight problem; where actions cost nothing it costs the same, else its stated costs are the replayed ones; a
+// policy that stays inside is left as it is; where the tool itself must leave there is no such policy.
+
+#include "planner/solver/fit_workspace.h"
+
+#include <gtest/gtest.h>
+
+#include "planner/preprocess/problem_family.h"
+#include "planner/solver/evaluate.h"
+#include "planner/solver/freeze_policy.h"
+#include "planner/solver/solve.h"
+#include "tests/planner/synthetic_plug.h"
+
+namespace feeler::planner {
+namespace {
+
+TEST(FitWorkspace, MovesThatEndInContactsAreMadeInPieces) {
+  const Task task = testing::MakePlugTask();
+  const auto map = testing::MakePlugMap(false, {6, 5, 8});
+  for (const double per_action : {0.0, 0.5}) {
+    Problem problem = MakeCuboidProblem(task, map, {5, 4, 3});
+    problem.cost.per_action = per_action;
+    const SolverResult result = Solve(problem, SolverOptions());
+    ASSERT_TRUE(result.complete());
+    int mended = 0;
+    // The workspace shrinks from below until the tool no longer reaches what it must touch.
+    for (; problem.workspace.min.z() < problem.start.z(); ++problem.workspace.min.z()) {
+      const std::optional<Policy> fitted = FitIntoWorkspace(problem, *result.policy);
+      if (StaysInWorkspace(problem, *result.policy)) {
+        ASSERT_TRUE(fitted.has_value());
+        EXPECT_EQ(fitted->nodes.size(), result.policy->nodes.size());
+        EXPECT_NEAR(fitted->expected_cost, result.expected_cost, 1e-9);
+        continue;
+      }
+      if (!fitted) continue;
+      ++mended;
+      const PolicyEvaluation evaluation = Evaluate(problem, *fitted);
+      EXPECT_EQ(evaluation.fault, "");
+      EXPECT_NEAR(fitted->expected_cost, evaluation.expected_cost, 1e-9);
+      EXPECT_GT(fitted->nodes.size(), result.policy->nodes.size());
+      if (per_action == 0.0) {
+        EXPECT_NEAR(fitted->expected_cost, result.expected_cost, 1e-9);
+      } else {
+        EXPECT_GT(fitted->expected_cost, result.expected_cost);
+      }
+    }
+    EXPECT_GT(mended, 0);
+    EXPECT_FALSE(FitIntoWorkspace(problem, *result.policy).has_value());
+  }
+}
+
+}  // namespace
+}  // namespace feeler::planner
