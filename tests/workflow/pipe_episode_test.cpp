@@ -68,17 +68,15 @@ void ExpectInserted(const EpisodeRecord& record) {
   EXPECT_LT(record.execution.sim_time_s, 25.0);
 }
 
-TEST_P(PipeEpisode, IsInsertedWhateverThePolicyKnows) {
+// One test, because the contact map takes longer than an episode.
+TEST_P(PipeEpisode, IsInsertedWhateverThePolicyKnowsAndAgainTheSame) {
   const auto nothing = [](const PolicyRequest&) { return std::make_unique<KnowsNothing>(); };
-  ExpectInserted(Run(nothing, "5x5x2x2", 0));
+  const EpisodeRecord one = Run(nothing, "5x5x2x2", 0);
+  ExpectInserted(one);
   ExpectInserted(Run(nothing, "5x4x1x2", 1));
   ExpectInserted(Run(Planned, "4x5x2x2", 2));
-}
 
-TEST_P(PipeEpisode, TheSameEpisodeGivesTheSameRecord) {
-  const auto nothing = [](const PolicyRequest&) { return std::make_unique<KnowsNothing>(); };
-  const EpisodeRecord one = Run(nothing, "4x4x2x1", 3);
-  const EpisodeRecord other = Run(nothing, "4x4x2x1", 3);
+  const EpisodeRecord other = Run(nothing, "5x5x2x2", 0);
   ASSERT_EQ(one.execution.moves.size(), other.execution.moves.size());
   for (std::size_t i = 0; i < one.execution.moves.size(); ++i) {
     EXPECT_EQ(one.execution.moves[i].travelled_m, other.execution.moves[i].travelled_m) << i;
