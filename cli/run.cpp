@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -14,6 +16,7 @@
 #include "core/error.h"
 #include "env/scene.h"
 #include "evaluation/episode_json.h"
+#include "evaluation/report/scene_geometry.h"
 #include "evaluation/run_summary.h"
 #include "workflow/database_builder.h"
 #include "workflow/episode.h"
@@ -34,6 +37,7 @@ struct Flags {
   std::string video;
   std::int64_t episodes = 1;
   std::int64_t seed = 1;
+  std::string versus;
   std::int64_t video_episode = 0;
   int jobs = 1;
   std::optional<double> confirm_limit_m;
@@ -62,6 +66,9 @@ void RequireSane(const Flags& flags) {
   if (flags.video_episode < 0) throw InputError("--video-episode", "negative", "give a number of at least 0");
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
   if (!flags.video.empty()) RequireWritable("--video", flags.video);
+  if (!flags.versus.empty() && flags.video.empty()) {
+    throw InputError("--versus", "is about the video, and there is none", "add --video FILE.mp4");
+  }
 }
 
 /// The problems that episodes draw from: the one given, else all that the database has a policy for, else the task's.
@@ -83,6 +90,23 @@ planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies:
   return family;
 }
 
+/// Films --video-episode, with --versus a second time under that policy.
+void WriteVideo(const Flags& flags, const std::function<workflow::EpisodeRunner()>& make_runner,
+                const std::function<workflow::EpisodeRunner()>& make_versus) {
+  ProgressBar bar("video frames");
+  const auto episode = static_cast<std::uint64_t>(flags.video_episode);
+  workflow::EpisodeRunner runner = make_runner();
+  if (flags.versus.empty()) {
+    workflow::RecordEpisodeVideo(runner, episode, flags.video, bar.Callback());
+    return;
+  }
+  workflow::EpisodeRunner versus = make_versus();
+  std::vector<workflow::EpisodeFilm> films;
+  films.push_back(workflow::FilmEpisode(runner, episode, flags.policy));
+  films.push_back(workflow::FilmEpisode(versus, episode, flags.versus));
+  workflow::WriteVideo(films, flags.video, bar.Callback());
+}
+
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = ParseJobs(flags.jobs);
@@ -92,8 +116,10 @@ void Run(const Flags& flags, Session& session) {
   if (!flags.db.empty()) {
     database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(flags.db));
   }
-  const workflow::PolicyFactory policy_factory =
-      workflow::MakePolicyFactory(flags.policy, database, workflow::ParsePolicyOptions(flags.policy_options));
+  const workflow::PolicyOptions policy_options = workflow::ParsePolicyOptions(flags.policy_options);
+  const workflow::PolicyFactory policy_factory = workflow::MakePolicyFactory(flags.policy, database, policy_options);
+  const workflow::PolicyFactory versus_factory =
+      flags.versus.empty() ? policy_factory : workflow::MakePolicyFactory(flags.versus, database, policy_options);
 
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
@@ -120,6 +146,7 @@ void Run(const Flags& flags, Session& session) {
   if (!flags.out.empty()) {
     out.open(flags.out);
     if (!out) throw InputError("--out", "cannot write " + flags.out, "choose another file");
+    evaluation::WriteSceneFile(*scene, std::filesystem::path(flags.out).parent_path().string());
   }
   std::vector<evaluation::EpisodeSummaryRow> rows;
   const auto on_record = [&](const workflow::EpisodeRecord& record) {
@@ -133,10 +160,15 @@ void Run(const Flags& flags, Session& session) {
   if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
 
   if (!flags.video.empty() && !session.cancellation->cancelled()) {
-    ProgressBar video_bar("video frames");
-    workflow::EpisodeRunner runner = make_runner();
-    workflow::RecordEpisodeVideo(runner, static_cast<std::uint64_t>(flags.video_episode), flags.video,
-                                 video_bar.Callback());
+    workflow::EpisodeOptions film_options = options;
+    film_options.replay = false;  // the camera is the only observer
+    const auto film = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, film_options); };
+    const auto film_versus = [&] {
+      workflow::EpisodeOptions versus_options = film_options;
+      versus_options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.versus);
+      return workflow::EpisodeRunner(setup, scene, versus_factory, versus_options);
+    };
+    WriteVideo(flags, film, film_versus);
   }
 
   const evaluation::RunSummary summary = evaluation::Summarize(rows);
@@ -181,6 +213,7 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();
   command->add_option("--out", flags->out, "records, one JSON object a line (docs/file-formats.md)");
   command->add_option("--video", flags->video, "MP4 of one episode");
+  command->add_option("--versus", flags->versus, "a second policy beside it in the video, on the same episode");
   command->add_option("--video-episode", flags->video_episode, "which episode the video shows")->capture_default_str();
   command->add_flag("--json", flags->json, "print the summary as JSON");
   command->callback([flags, &session] { Run(*flags, session); });
