@@ -1,5 +1,6 @@
 #include "execution/spiral_search.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -14,8 +15,11 @@ constexpr double kStiffness_n_m = 4000.0;
 /// Way points per turn, and how many of them make one motion.
 constexpr int kPerTurn = 16;
 constexpr int kPerMotion = 8;
-/// A tool that follows less than half of a spiral this wide, on both sides, is held: it fell right into the opening.
-constexpr double kHeldRadius_m = 0.002;
+/// A tool that stays this near to the middle while the spiral goes this far is held by the walls of the opening: it
+/// came right down into it. On the face it lags behind by what friction holds, some millimetres. (A narrower search
+/// looks for the face not as deep as the bottom.)
+constexpr double kHeld_m = 0.0015;
+constexpr double kWide_m = 0.008;
 
 /// The tool stands in the opening, deeper than its mouth: pushes it down.
 SpiralFind PushDown(const Task& task, Mover& mover) {
@@ -41,7 +45,7 @@ std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& 
   const double pressed = height + SignOf(task.insertion) * mover.Cells(search.press_n / kStiffness_n_m);
   const int points = static_cast<int>(search.radius_m / search.pitch_m * kPerTurn);
   std::vector<Eigen::Vector3d> way;
-  int held = 0;
+  double farthest = 0.0;
   for (int i = 1; i <= points; ++i) {
     const double angle = 2.0 * std::numbers::pi * i / kPerTurn;
     const double radius = mover.Cells(search.pitch_m) * i / kPerTurn;
@@ -58,9 +62,9 @@ std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& 
     }
     Eigen::Vector3d followed = report.end - target;
     followed[axis] = 0.0;
-    held = radius > mover.Cells(kHeldRadius_m) && followed.norm() < 0.5 * radius ? held + 1 : 0;
-    if (held == 2) return PushDown(task, mover);
+    farthest = std::max(farthest, followed.norm());
   }
+  if (search.radius_m > kWide_m && farthest < mover.Cells(kHeld_m)) return PushDown(task, mover);
   mover.Retreat(target - range * inward);
   return std::nullopt;
 }
