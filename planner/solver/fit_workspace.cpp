@@ -34,7 +34,8 @@ std::uint32_t AddInPieces(const Problem& problem, const PolicyNode& node, Policy
   for (const PolicyBranch& branch : node.branches) furthest = std::max(furthest, branch.outcome.cells);
   const std::vector<int> pieces = Pieces(problem.move_lengths, furthest + 1);
   int end = furthest + 1;
-  std::uint32_t after = 0;
+  std::uint32_t after = 0;  // where it goes on past the piece in hand
+  Cell after_shift = Cell::Zero();
   double left = 0.0;  // probability of getting past the piece in hand
   for (auto piece = pieces.rbegin(); piece != pieces.rend(); ++piece) {
     const int begin = end - *piece;
@@ -47,12 +48,22 @@ std::uint32_t AddInPieces(const Problem& problem, const PolicyNode& node, Policy
       part.branches.back().outcome.cells -= begin;
       total += branch.probability;
     }
-    if (left > 0.0) part.branches.push_back({{*piece, false}, after, Cell::Zero(), left});
+    const PolicyBranch* const only = part.branches.size() == 1 && left == 0.0 ? part.branches.data() : nullptr;
+    if (only != nullptr && only->outcome.cells == 0 && std::next(piece) != pieces.rend()) {
+      // All who are left touch at once: the piece would tell nothing.
+      after = only->next;
+      after_shift = only->shift;
+      left = total;
+      end = begin;
+      continue;
+    }
+    if (left > 0.0) part.branches.push_back({{*piece, false}, after, after_shift, left});
     for (PolicyBranch& branch : part.branches) branch.probability /= total;
     left = total;
     end = begin;
     part.expected_cost = CostToGo(policy, part, problem.cost);
     after = static_cast<std::uint32_t>(policy.nodes.size());
+    after_shift = Cell::Zero();
     policy.nodes.push_back(std::move(part));
   }
   return after;
