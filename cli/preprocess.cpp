@@ -9,8 +9,10 @@
 #include "cli/progress_bar.h"
 #include "cli/solver_flags.h"
 #include "core/error.h"
+#include "env/fingerprint.h"
 #include "policies/formats/problem_family_file.h"
 #include "workflow/database_builder.h"
+#include "workflow/perceive_table.h"
 
 namespace feeler::cli {
 namespace {
@@ -28,8 +30,13 @@ struct Flags {
   SolverFlags solver;
 };
 
-planner::ProblemFamily FamilyFor(const std::string& text, const Task& task) {
+planner::ProblemFamily FamilyFor(const std::string& text, const workflow::PlanningSetup& setup) {
+  const Task& task = setup.task();
   if (text.empty()) return planner::FamilyOf(task);
+  if (workflow::IsTableFile(text)) {
+    const std::string fingerprint = env::Fingerprint(setup.model, env::Opening::kClosed);
+    return workflow::FamilyOfTable(workflow::LoadTable(text, task, fingerprint), task, text);
+  }
   if (text.ends_with(".json")) return policies::ReadProblemFamily(text, task);
   return planner::ParseProblemFamily(text, task);
 }
@@ -56,7 +63,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   setup_options.progress = map_bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
   map_bar.Finish();
-  const planner::ProblemFamily family = FamilyFor(flags.family, setup.task());
+  const planner::ProblemFamily family = FamilyFor(flags.family, setup);
   workflow::RequireWithinTask(family, setup.task());
 
   ProgressBar table_bar("tables");
@@ -89,6 +96,7 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   command->add_option("--out", flags->out, "database file; an existing one is continued")->required();
   command->add_option("--family", flags->family,
                       "problems, a range or count per axis of the task, e.g. 2..15x2..15x2..15, or a JSON file of them "
+                      "or an uncertainty table "
                       "(default: the task's ranges)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--cost", flags->cost, "distance (the task's feeler_cost) or time, in seconds")

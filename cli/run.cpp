@@ -14,6 +14,7 @@
 #include "cli/progress_bar.h"
 #include "cli/solver_flags.h"
 #include "core/error.h"
+#include "env/fingerprint.h"
 #include "env/scene.h"
 #include "evaluation/episode_json.h"
 #include "evaluation/report/scene_geometry.h"
@@ -22,6 +23,7 @@
 #include "workflow/episode.h"
 #include "workflow/episode_noise.h"
 #include "workflow/episode_video.h"
+#include "workflow/perceive_table.h"
 
 namespace feeler::cli {
 namespace {
@@ -33,6 +35,9 @@ struct Flags {
   std::vector<std::string> policy_options;
   std::string extents;
   std::string noise = "ideal";
+  std::string placement = "nominal";
+  std::string perception;
+  std::string table;
   std::string out;
   std::string video;
   std::int64_t episodes = 1;
@@ -64,6 +69,16 @@ void RequireSane(const Flags& flags) {
     throw InputError("--episodes", std::to_string(flags.episodes) + " episodes", "give a number of at least 1");
   }
   if (flags.video_episode < 0) throw InputError("--video-episode", "negative", "give a number of at least 0");
+  if (!flags.perception.empty() && flags.perception != "icp") {
+    throw InputError("--perception", "unknown name \"" + flags.perception + "\"", "choose icp");
+  }
+  if (flags.perception.empty() != flags.table.empty()) {
+    throw InputError("--table", "goes with --perception, and --perception with --table",
+                     "make a table with feeler perceive calibrate");
+  }
+  if (!flags.perception.empty() && !flags.extents.empty()) {
+    throw InputError("--extents", "the camera decides on the problem", "leave out --extents or --perception");
+  }
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
   if (!flags.video.empty()) RequireWritable("--video", flags.video);
   if (!flags.versus.empty() && flags.video.empty()) {
@@ -90,6 +105,16 @@ planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies:
   return family;
 }
 
+std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::string& table,
+                                                                 const workflow::PlanningSetup& setup) {
+  workflow::EpisodePerception perception;
+  perception.table = workflow::LoadTable(table, setup.task(), env::Fingerprint(setup.model, env::Opening::kClosed));
+  workflow::PerceptionSettings settings;
+  settings.averaged_frames = perception.table.averaged_frames;
+  perception.finder = std::make_shared<const workflow::TargetFinder>(setup.model, settings);
+  return std::make_shared<const workflow::EpisodePerception>(std::move(perception));
+}
+
 /// Films --video-episode, with --versus a second time under that policy.
 void WriteVideo(const Flags& flags, const std::function<workflow::EpisodeRunner()>& make_runner,
                 const std::function<workflow::EpisodeRunner()>& make_versus) {
@@ -110,6 +135,7 @@ void WriteVideo(const Flags& flags, const std::function<workflow::EpisodeRunner(
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = ParseJobs(flags.jobs);
+  const workflow::Placement placement = workflow::ParsePlacement(flags.placement);
   workflow::ParseNoise(flags.noise);  // an unknown name fails before the contact map is built
 
   std::shared_ptr<policies::Database> database;
@@ -135,6 +161,8 @@ void Run(const Flags& flags, Session& session) {
   options.seed = ParseSeed(flags.seed);
   options.family = FamilyFor(flags, setup->task(), database.get());
   options.noise = flags.noise;
+  options.placement = placement;
+  if (!flags.perception.empty()) options.perception = PerceptionFor(flags.table, *setup);
   options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
   options.confirm_limit_m = flags.confirm_limit_m;
   options.replay = !flags.out.empty();
@@ -177,6 +205,8 @@ void Run(const Flags& flags, Session& session) {
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["noise"] = flags.noise;
+    json["placement"] = workflow::ToString(options.perception ? workflow::Placement::kWorkspace : placement);
+    json["perception"] = flags.perception.empty() ? nlohmann::json() : nlohmann::json(flags.perception);
     json["ladder"] = options.ladder;
     json["seed"] = flags.seed;
     PrintJson(json);
@@ -205,6 +235,13 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_option("--extents", flags->extents,
                       "always this problem, e.g. 7x7x7 (default: drawn from the database)");
   command->add_option("--noise", flags->noise, NoiseHelp())->capture_default_str();
+  command
+      ->add_option("--placement", flags->placement,
+                   "where the target stands: nominal (as the task file says) or workspace (anywhere in reach, turned)")
+      ->capture_default_str();
+  command->add_option("--perception", flags->perception,
+                      "icp: hypotheses from a depth camera that looks at a target in the workspace (with --table)");
+  command->add_option("--table", flags->table, "uncertainty table of the task (feeler perceive calibrate)");
   command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
   command->add_option("--confirm-limit", flags->confirm_limit_m,
                       "touch until the position across the insertion is known this well, m (default: 0.0005)");
