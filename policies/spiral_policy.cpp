@@ -10,6 +10,9 @@ namespace {
 
 /// Beyond the box where the target may be: the tool drops in before it stands exactly over the opening.
 constexpr double kFaceMargin_m = 0.002;
+/// A tool that is pressed by 1 N lags behind the spiral by this: friction of 0.3 against a lateral stiffness of 1000
+/// N/m.
+constexpr double kLag_m_per_n = 0.0003;
 
 void RequirePositive(const char* what, double value) {
   if (!(std::isfinite(value) && value > 0.0)) {
@@ -52,8 +55,8 @@ Decision SpiralPolicy::Next(const Belief& belief) {
   Eigen::Vector3d across_m = half_m;
   across_m[axis] = 0.0;
   SpiralSearch search;
-  // To the corners, and a turn more, so that the last turn lies outside.
-  search.radius_m = across_m.norm() + tuning_.pitch_m;
+  // To the corners, a turn more, so that the last turn lies outside, and what the tool lags behind.
+  search.radius_m = across_m.norm() + tuning_.pitch_m + kLag_m_per_n * tuning_.press_n;
   search.pitch_m = tuning_.pitch_m;
   search.speed_m_s = tuning_.speed_m_s;
   search.press_n = tuning_.press_n;

@@ -193,7 +193,8 @@ struct Tuned {
   double hybrid_threshold_m;
 };
 
-// Measured: docs/experiments.md. The last one serves every task that is not named.
+// Starting points: the full sizes of `feeler experiment spiral-tuning` and `baselines` are what these should come from
+// (docs/experiments.md says what was run). The last one serves every task that is not named.
 constexpr Tuned kTuned[] = {
     {"plug", {0.0015, 0.02, 10.0}, 0.008},
     {"plug-tight", {0.0004, 0.02, 10.0}, 0.004},

@@ -41,11 +41,11 @@ struct PolicyOptions {
 /// spiral-speed, spiral-force, hybrid-threshold. Throws InputError listing the keys for an unknown one.
 PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings);
 
-/// The best settings that `feeler experiment spiral-tuning` found for the socket of a task; for other tasks those of
-/// the tightest socket.
+/// Settings for the socket of a task, to be taken from `feeler experiment spiral-tuning`; for other tasks those of the
+/// tightest socket.
 policies::SpiralTuning TunedSpiral(const Task& task);
-/// Below this half width of the uncertainty the spiral is faster than touch, as `feeler experiment baselines` measured
-/// it for the socket of a task.
+/// Below this half width of the uncertainty `hybrid` spirals on the socket of a task; to be taken from where the curves
+/// of `feeler experiment baselines` cross.
 double MeasuredHybridThreshold(const Task& task);
 
 /// Names that `MakePolicyFactory` knows.
