@@ -1,0 +1,222 @@
+// feeler perceive: from a depth image or point cloud to hypotheses; and the uncertainty table that this takes.
+#include "workflow/perceive.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "env/fingerprint.h"
+#include "env/task_file.h"
+#include "perception/cloud_file.h"
+#include "perception/depth_file.h"
+#include "perception/input_file.h"
+#include "policies/storage/database.h"
+#include "workflow/calibrate.h"
+#include "workflow/episode_draw.h"
+#include "workflow/perceive_table.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string task;
+  std::string depth, intrinsics, background;
+  std::string cloud;
+  std::string table;
+  std::string db;
+  bool json = false;
+};
+
+struct CalibrateFlags {
+  std::string task;
+  std::string out;
+  int poses = 1000;
+  int installations = 5;
+  int frames = 10;
+  std::int64_t seed = 1;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  bool json = false;
+};
+
+void RequireSources(const Flags& flags) {
+  if (flags.task.empty()) throw InputError("--task", "missing", "say which target to look for");
+  if (flags.table.empty()) throw InputError("--table", "missing", "make one with feeler perceive calibrate");
+  if (flags.depth.empty() == flags.cloud.empty()) {
+    throw InputError("command line", "one of --depth and --cloud is needed",
+                     "give --depth with --intrinsics, or --cloud");
+  }
+  if (!flags.depth.empty() && flags.intrinsics.empty()) {
+    throw InputError("--intrinsics", "missing", "give the JSON of the camera that took the depth image");
+  }
+  if (!flags.background.empty() && flags.depth.empty()) {
+    throw InputError("--background", "needs a depth image", "give --depth as well");
+  }
+}
+
+perception::Registration Locate(const Flags& flags, const workflow::TargetFinder& finder,
+                                const perception::UncertaintyTable& table) {
+  std::optional<perception::CameraIntrinsics> camera;
+  if (!flags.intrinsics.empty()) {
+    camera = perception::ParseIntrinsics(perception::ReadFile(flags.intrinsics), flags.intrinsics);
+  }
+  if (!flags.cloud.empty()) {
+    perception::Points points = perception::ReadCloud(flags.cloud);
+    if (!camera) return finder.InCloud(points, table.camera_m);
+    for (Eigen::Vector3d& p : points) p = camera->world_T_camera * p;
+    return finder.InCloud(points, camera->world_T_camera.translation());
+  }
+  const perception::DepthFrame depth =
+      perception::ParseDepthPng(perception::ReadFile(flags.depth), *camera, flags.depth);
+  if (flags.background.empty()) return finder.InDepth(depth, *camera);
+  const perception::DepthFrame background =
+      perception::ParseDepthPng(perception::ReadFile(flags.background), *camera, flags.background);
+  return finder.InDepth(depth, *camera, &background);
+}
+
+void Perceive(const Flags& flags) {
+  RequireSources(flags);
+  const env::TaskModel model = env::LoadTask(flags.task);
+  const Task& task = model.task;
+  const perception::UncertaintyTable table =
+      workflow::LoadTable(flags.table, task, env::Fingerprint(model, env::Opening::kClosed));
+  planner::ProblemFamily family = workflow::FamilyOfTable(table, task, flags.table);
+  if (!flags.db.empty()) {
+    policies::Database database = policies::Database::OpenReadOnly(flags.db);
+    family.problems.clear();
+    for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
+  }
+  const workflow::TargetFinder finder(model);
+  const perception::Registration found = Locate(flags, finder, table);
+  if (!found.found) throw NegativeResult(flags.depth + flags.cloud, "target not found: " + found.reason);
+
+  const perception::PoseHypotheses hypotheses = perception::HypothesesFor(table, found.world_T_target);
+  const auto extents = workflow::SnapTo(family, task, hypotheses.counts);
+  if (!extents) throw NegativeResult(flags.db, "holds no problem large enough for this estimate");
+  const std::vector<int> counts = workflow::AxisExtents(task, *extents);
+  if (!flags.json) {
+    const Eigen::Vector3d& p = hypotheses.world_T_estimate.translation();
+    fmt::print("target at {:.4f} {:.4f} {:.4f} m, fitness {:.2f}; {} hypotheses ({})\n", p.x(), p.y(), p.z(),
+               found.fitness, extents->Count(), planner::ToString(*extents));
+    return;
+  }
+  nlohmann::ordered_json json;
+  json["task"] = task.name;
+  json["found"] = true;
+  json["estimate"] = perception::PoseJson(hypotheses.world_T_estimate);
+  json["registered"] = perception::PoseJson(found.world_T_target);
+  json["extents"] = planner::ToString(*extents);
+  json["axes"] = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < task.axes.size(); ++i) {
+    json["axes"].push_back({{"axis", std::string(ToString(task.axes[i].kind))},
+                            {"count", counts[i]},
+                            {"resolution", task.axes[i].resolution}});
+  }
+  json["hypotheses"] = extents->Count();
+  json["rule"] = hypotheses.rule;
+  json["clamped"] = hypotheses.clamped;
+  json["fitness"] = found.fitness;
+  json["explained"] = found.explained;
+  json["rms_m"] = found.rms_m;
+  json["points"] = found.points;
+  json["covariance"] = nlohmann::ordered_json::array();
+  for (Eigen::Index row = 0; row < found.covariance.rows(); ++row) {
+    const Eigen::VectorXd values = found.covariance.row(row);
+    json["covariance"].push_back(std::vector<double>(values.data(), values.data() + values.size()));
+  }
+  fmt::print("{}\n", json.dump(2));
+}
+
+std::string CoverageLine(const char* name, const perception::TableScore& score) {
+  return fmt::format("{:<34} {:>5} of {:<5} ({:.2f} %)   {:.0f} hypotheses on average, {} at most\n", name,
+                     score.covered, score.samples, score.samples > 0 ? 100.0 * score.covered / score.samples : 0.0,
+                     score.mean_hypotheses, score.most_hypotheses);
+}
+
+std::string ErrorLine(const char* name, const workflow::ErrorSummary& errors) {
+  constexpr double kDegree = 57.29577951308232;
+  return fmt::format("{:<34} {:.1f} / {:.1f} / {:.1f} mm along, across, vertical; yaw {:.2f} deg; {} above 30 mm\n",
+                     name, 1e3 * errors.along_p95_m, 1e3 * errors.across_p95_m, 1e3 * errors.vertical_p95_m,
+                     kDegree * errors.yaw_p95_rad, errors.gross);
+}
+
+void Calibrate(const CalibrateFlags& flags, Session& session) {
+  workflow::CalibrationOptions options;
+  options.poses = flags.poses;
+  options.installations = flags.installations;
+  options.seed = ParseSeed(flags.seed);
+  options.jobs = ParseJobs(flags.jobs);
+  options.perception.averaged_frames = flags.frames;
+  options.partial = flags.out + ".partial.jsonl";
+  options.cancellation = session.cancellation;
+  options.Validate();
+  RequireWritable("--out", flags.out);
+  const env::TaskModel model = env::LoadTask(flags.task);
+  ProgressBar bar("poses");
+  options.progress = bar.Callback();
+  const workflow::Calibration calibration = workflow::Calibrate(model, options);
+  bar.Finish();
+  if (!calibration.complete) {
+    fmt::print(stderr, "interrupted after {} of {} poses; run the same command again to go on\n",
+               calibration.samples.size(), 2 * flags.poses);
+    session.exit_code = 1;
+    return;
+  }
+  const std::string report = workflow::ReportJson(calibration, options);
+  perception::WriteFile(flags.out, perception::ToJson(calibration.table, report));
+  if (flags.json) {
+    PrintJson(nlohmann::json::parse(report));
+    return;
+  }
+  std::string text = fmt::format(
+      "task {}: {} poses and {} installations for the table, as many others to judge it; {} "
+      "targets not found\n",
+      model.task.name, flags.poses, flags.installations, calibration.not_found);
+  text += ErrorLine("95 % of errors below", workflow::SummarizeErrors(calibration, false));
+  text += ErrorLine("the same without bias", workflow::SummarizeErrors(calibration, true));
+  text += CoverageLine("truth within hypotheses, held out", calibration.held_out);
+  text += CoverageLine("without bias correction (paper)", calibration.held_out_plain);
+  fmt::print("{}", text);
+}
+
+}  // namespace
+
+void AddPerceiveCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command =
+      app.add_subcommand("perceive", "Hypotheses from a depth image or point cloud; calibrate: the table this takes");
+  command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");
+  command->add_option("--depth", flags->depth, "16-bit PNG of depths");
+  command->add_option("--intrinsics", flags->intrinsics,
+                      "JSON of the camera and where it stands (docs/file-formats.md); with --cloud: its points are in "
+                      "the camera's frame");
+  command->add_option("--background", flags->background, "depth image of the scene without the target");
+  command->add_option("--cloud", flags->cloud, "PLY or PCD file, metres, in the base frame of the robot");
+  command->add_option("--table", flags->table, "uncertainty table of the task (feeler perceive calibrate)");
+  command->add_option("--db", flags->db, "give the smallest problem of this database that covers the estimate");
+  command->add_flag("--json", flags->json, "print the result as JSON");
+
+  auto calibrate = std::make_shared<CalibrateFlags>();
+  CLI::App* nested =
+      command->add_subcommand("calibrate", "Make the uncertainty table of a task from simulated captures");
+  nested->add_option("--task", calibrate->task, "name under models/tasks/, or path of a task file")->required();
+  nested->add_option("--out", calibrate->out, "table file (JSON)")->required();
+  nested->add_option("--poses", calibrate->poses, "to make it from; as many others judge it")->capture_default_str();
+  nested->add_option("--installations", calibrate->installations, "of the camera; as many others judge it")
+      ->capture_default_str();
+  nested->add_option("--frames", calibrate->frames, "averaged for a picture")->capture_default_str();
+  nested->add_option("--seed", calibrate->seed, "of all draws")->capture_default_str();
+  nested->add_option("--jobs", calibrate->jobs, "threads; the table does not depend on it")->capture_default_str();
+  nested->add_flag("--json", calibrate->json, "print the report as JSON");
+  nested->callback([calibrate, &session] { Calibrate(*calibrate, session); });
+  command->callback([flags, command] {
+    if (command->get_subcommands().empty()) Perceive(*flags);
+  });
+}
+
+}  // namespace feeler::cli
