@@ -84,11 +84,13 @@ void VisualServoingPolicy::See(const CameraView& view) {
   }
   lost_ = 0;
   std::vector<ServoPoint> points;
+  double farthest = 0.0;
   for (const FeatureMatch& match : found.matches) {
     points.push_back({Normalised(view, match.seen_px), Normalised(goal_->view, match.goal_px), match.goal_depth_m});
+    farthest = std::max(farthest, (points.back().seen - points.back().goal).norm());
   }
   const CameraTwist step = ServoStep(points, options_.freedom);
-  if (step.isZero(0.0)) {
+  if (step.isZero(0.0) && farthest > 0.0) {
     next_ = GiveUp{"the features do not tell where to go"};
     return;
   }

@@ -46,7 +46,7 @@ class FeatureTracker {
 struct TapeOptions {
   int least_redness = 50;      ///< red above the larger of green and blue, of 255
   int least_area_px = 150;     ///< a smaller patch is not the tape
-  double least_fill = 0.85;    ///< of the patch in its hull: less, and something hides part of it
+  double least_fill = 0.92;    ///< of the patch in its hull: less, and something hides part of it
   double edge_range_px = 4.0;  ///< an edge is looked for this far to both sides
 };
 
