@@ -59,7 +59,7 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
        // Friction that the observer has not caught up with reads as force at the tool.
        if (torque_nm > 0.0) n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 10.0);
      }},
-    {"stiffness", "stiffness of each joint between encoder and link, Nm/rad (a UR10e has some 50000)", 1000.0, 1e9,
+    {"stiffness", "stiffness of each joint between encoder and link, Nm/rad (a UR10e has some 50000)", 1e4, 1e9,
      [](EpisodeNoise& n, double stiffness) { n.robot.joint_stiffness_nm_rad = stiffness; }},
     {"yaw", "the target is turned by so many degrees, either way", 0.0, 30.0,
      [](EpisodeNoise& n, double degrees) { AddYaw(n, degrees); }},

@@ -197,7 +197,7 @@ struct Tuned {
 // (docs/experiments.md says what was run). The last one serves every task that is not named.
 constexpr Tuned kTuned[] = {
     {"plug", {0.0015, 0.02, 10.0}, 0.008},
-    {"plug-tight", {0.0004, 0.02, 10.0}, 0.004},
+    {"plug-tight", {0.0004, 0.02, 10.0}, 0.0025},
 };
 
 const Tuned& TunedFor(const Task& task) {

@@ -23,9 +23,9 @@ struct Kind {
 
 const std::vector<Kind>& Kinds() {
   static const std::vector<Kind> kKinds = {
-      {"force-noise", "noise of the force sensor", "N", {0, 1, 2, 4, 8}},
+      {"force-noise", "noise of the force sensor", "N", {0, 1, 2, 4, 6}},
       {"joint-friction", "joint friction", "Nm", {0, 3, 6, 10, 15}},
-      {"stiffness", "joint stiffness", "Nm/rad", {200000, 50000, 20000, 10000, 5000}},
+      {"stiffness", "joint stiffness", "Nm/rad", {200000, 50000, 30000, 20000, 10000}},
       {"yaw", "turned target", "deg", {0, 1, 2, 3, 4, 6}},
   };
   return kKinds;
