@@ -187,7 +187,9 @@ const LeavingBound::Probes& LeavingBound::ProbesOfSet(SetId set, const Group& gr
       const Probe probe{{static_cast<std::int16_t>(place.x()), static_cast<std::int16_t>(place.y()),
                          static_cast<std::int16_t>(place.z())},
                         static_cast<std::uint32_t>(probes.groups.size())};
-      if (weights.empty()) {
+      const bool nothing =
+          bounds.size() <= most_in_goal_ + 1;  // those that a goal may keep cost nothing at any weights
+      if (weights.empty() || nothing) {
         const auto [known, is_new] = index.try_emplace(&bounds, probe.group);
         if (is_new) probes.groups.push_back(&bounds);
         probes.probes.push_back({probe.place, known->second});
@@ -204,7 +206,7 @@ const LeavingBound::Probes& LeavingBound::ProbesOfSet(SetId set, const Group& gr
     };
     ForEachTellingStep(group, tables, place, problem_.workspace, step);
   }
-  probe_count_ += probes.probes.size() * (weights.empty() ? 1 : 8);
+  probe_count_ += probes.probes.size() + 8 * probes.weighted.size();
   return probes;
 }
 

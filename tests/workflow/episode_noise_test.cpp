@@ -89,9 +89,7 @@ std::shared_ptr<const PlanningSetup> PlugSetup() {
 
 EpisodeRunner Runner(std::shared_ptr<const PlanningSetup> setup, const std::string& noise) {
   static const auto kPlanner = std::make_shared<execution::OnlinePlanner>();
-  const auto factory = [](const planner::Problem& problem, const planner::Extents&) {
-    return kPlanner->PolicyFor(problem);
-  };
+  const auto factory = [](const PolicyRequest& request) { return kPlanner->PolicyFor(request.problem); };
   EpisodeOptions options;
   options.seed = 17;
   options.family = planner::ParseProblemFamily("3x3x3");
