@@ -14,7 +14,6 @@
 namespace feeler::perception {
 namespace {
 
-constexpr std::size_t kLeastSamples = 20;
 /// Estimates nearer than this to an axis' own noise still get a scale.
 constexpr double kLeastScale = 0.1;  // of the resolution
 
@@ -181,11 +180,11 @@ void FitRules(const std::vector<PoseSample>& samples, const TableOptions& option
   if (options.ranges < 1 || !(options.quantile > 0.0 && options.quantile <= 1.0) || !(options.margin >= 1.0)) {
     throw InputError("uncertainty table", "an option is out of range", "ranges >= 1, 0 < quantile <= 1, margin >= 1");
   }
-  const auto ranges = static_cast<std::size_t>(options.ranges);
-  if (samples.size() < kLeastSamples * ranges) {
-    throw InputError("uncertainty table", fmt::format("{} samples for {} ranges of distance", samples.size(), ranges),
-                     fmt::format("give at least {}", kLeastSamples * ranges));
+  if (samples.size() < kLeastSamples) {
+    throw InputError("uncertainty table", fmt::format("{} samples", samples.size()),
+                     fmt::format("give at least {}", kLeastSamples));
   }
+  const auto ranges = std::min(static_cast<std::size_t>(options.ranges), samples.size() / kLeastSamples);
   std::vector<const PoseSample*> order;
   for (const PoseSample& sample : samples) order.push_back(&sample);
   const auto distance = [&](const PoseSample* sample) { return Distance(table, sample->world_T_estimate); };

@@ -76,7 +76,7 @@ Eigen::VectorXd OffsetAlong(const std::vector<UncertainAxis>& axes, const Pose& 
 bool Covers(const std::vector<UncertainAxis>& axes, const PoseHypotheses& hypotheses, const Pose& world_T_true);
 
 struct TableOptions {
-  int ranges = 4;  ///< of distance, each with the same number of samples
+  int ranges = 4;  ///< of distance, each with the same number of samples; fewer where that is below kLeastSamples
   /// The half extents of a rule are the sum of two: what holds this share of its samples on all axes at once about the
   /// mean of their installation, times `margin`;
   double quantile = 0.995;
@@ -86,8 +86,10 @@ struct TableOptions {
   double installation_deviations = 3.0;
 };
 
-/// Fits the rules to samples; `table` brings task, axes and camera. Throws InputError for fewer than 20 samples a
-/// range.
+/// Fewest samples of a rule.
+constexpr std::size_t kLeastSamples = 20;
+
+/// Fits the rules to samples; `table` brings task, axes and camera. Throws InputError for fewer than kLeastSamples.
 void FitRules(const std::vector<PoseSample>& samples, const TableOptions& options, UncertaintyTable& table);
 
 /// How a table fares on samples that it was not made from.

@@ -138,8 +138,10 @@ nlohmann::ordered_json ErrorsJson(const ErrorSummary& errors) {
 }  // namespace
 
 void CalibrationOptions::Validate() const {
-  if (poses < 1 || poses > 1000000) {
-    throw InputError("calibration", fmt::format("{} poses", poses), "give 1 to 1000000");
+  constexpr int kMostPoses = 1000000;
+  if (poses < static_cast<int>(perception::kLeastSamples) || poses > kMostPoses) {
+    throw InputError("calibration", fmt::format("{} poses", poses),
+                     fmt::format("give {} to {}", perception::kLeastSamples, kMostPoses));
   }
   if (installations < 1 || installations > poses) {
     throw InputError("calibration", fmt::format("{} installations for {} poses", installations, poses),

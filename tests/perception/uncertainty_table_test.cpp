@@ -122,7 +122,9 @@ TEST(UncertaintyTable, OtherVersionsAndTasksAreRefused) {
   task.name = "pipe";
   EXPECT_THROW(RequireTask(table, task, "def", "table.json"), InputError);
   EXPECT_NO_THROW(RequireTask(table, task, "abc", "table.json"));
-  EXPECT_THROW(FitRules(Samples(30, 1), {}, table), InputError);
+  EXPECT_THROW(FitRules(Samples(19, 1), {}, table), InputError);
+  FitRules(Samples(45, 1), {}, table);
+  EXPECT_EQ(table.rules.size(), 2U);
 }
 
 }  // namespace
