@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/orientation_lattice.h"
 #include "policies/storage/database_sink.h"
 #include "policies/storage/verify.h"
 
@@ -21,7 +22,8 @@ namespace {
 
 /// What each problem is solved with.
 planner::SolverOptions Budgeted(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
-  return planner::WithFamilyBudget(options.solver, setup.opening == env::Opening::kOpen);
+  return planner::WithFamilyBudget(options.solver, {.openings = setup.opening == env::Opening::kOpen,
+                                                    .orientations = LatticeOrientations(setup.task()) > 1});
 }
 
 /// Null where there is no limit: JSON has no infinity.

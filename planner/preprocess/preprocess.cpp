@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/orientation_lattice.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -20,7 +22,13 @@ namespace {
 constexpr std::size_t kLookAhead = 256;
 /// Budget of the certified solver for a problem where none is given.
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
+constexpr std::int64_t kDefaultExpansionLimitOrientations = 6000;
 constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
+
+std::int64_t DefaultExpansionLimit(const FamilyTraits& family) {
+  if (family.openings) return kDefaultExpansionLimitOpen;
+  return family.orientations ? kDefaultExpansionLimitOrientations : kDefaultExpansionLimit;
+}
 
 class Framework {
  public:
@@ -31,7 +39,7 @@ class Framework {
         family_(family),
         options_(options),
         sink_(sink),
-        solver_(WithFamilyBudget(options.solver)),
+        solver_(WithFamilyBudget(options.solver, {.orientations = LatticeOrientations(task) > 1})),
         order_(OrderOf(family, options.order, options.seed)),
         states_(order_.size()) {
     solver_.on_bounds = nullptr;
@@ -188,10 +196,10 @@ class Framework {
 
 }  // namespace
 
-SolverOptions WithFamilyBudget(SolverOptions solver, bool openings) {
+SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family) {
   if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
       solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
-    solver.expansion_limit = openings ? kDefaultExpansionLimitOpen : kDefaultExpansionLimit;
+    solver.expansion_limit = DefaultExpansionLimit(family);
   }
   if (solver.solver == SolverKind::kCertified && solver.gap < kTightGap && solver.cuboids_where_tight &&
       solver.heuristic == HeuristicKind::kCertificate) {

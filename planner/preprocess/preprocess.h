@@ -24,11 +24,18 @@ class PolicySink {
   virtual void Store(const Extents& extents, const Problem& problem, const SolverResult& result) = 0;
 };
 
+/// What a family is budgeted by.
+struct FamilyTraits {
+  bool openings = false;      ///< the opening of the target is open while localizing
+  bool orientations = false;  ///< the orientation of the target is uncertain
+};
+
 /// The options that each problem of a family is solved with: the certified solver without any limit is given 20,000
-/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family (500 where the map
-/// has openings: the first policy and the bound at the start are all there, and the search between them adds nothing);
-/// at a gap below kTightGap it takes cuboids for certificates, unless told not to.
-SolverOptions WithFamilyBudget(SolverOptions solver, bool openings = false);
+/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family (6,000 with uncertain
+/// orientations, whose large problems stay open whatever they are given; 500 where the map has openings: the first
+/// policy and the bound at the start are all there, and the search between them adds nothing); at a gap below kTightGap
+/// it takes cuboids for certificates, unless told not to.
+SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {});
 
 struct PreprocessOptions {
   /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them.

@@ -1,6 +1,6 @@
 // Laws of preprocessing: every problem of the family ends in the sink, once; policies are the same for one and several
 // threads, and when a run is cut into two; an experience never breaks the bound; a cancelled run stores only finished
-// problems.
+// problems; a limit that was set is kept, and only the certified solver is given one that was not.
 
 #include "planner/preprocess/preprocess.h"
 
@@ -100,6 +100,25 @@ TEST(ProblemFamily, ParsesAndOrders) {
     EXPECT_THROW(ParseProblemFamily(bad), InputError) << bad;
     EXPECT_THROW(ParseExtents(bad), InputError) << bad;
   }
+}
+
+TEST(FamilyBudget, KeepsWhatWasSet) {
+  const SolverOptions unlimited = FastSetting(SolverKind::kCertified, 1.0);
+  const std::int64_t closed = WithFamilyBudget(unlimited).expansion_limit;
+  const std::int64_t oriented = WithFamilyBudget(unlimited, {.orientations = true}).expansion_limit;
+  const std::int64_t open = WithFamilyBudget(unlimited, {.openings = true}).expansion_limit;
+  EXPECT_LT(open, oriented);
+  EXPECT_LT(oriented, closed);
+  EXPECT_LT(closed, unlimited.expansion_limit);
+
+  SolverOptions limited = unlimited;
+  limited.expansion_limit = 123456;
+  EXPECT_EQ(WithFamilyBudget(limited, {.orientations = true}).expansion_limit, 123456);
+  limited = unlimited;
+  limited.time_limit_s = 10.0;
+  EXPECT_EQ(WithFamilyBudget(limited, {.orientations = true}).expansion_limit, unlimited.expansion_limit);
+  const SolverOptions other = FastSetting(SolverKind::kRtdpBel, 2.0);
+  EXPECT_EQ(WithFamilyBudget(other, {.orientations = true}).expansion_limit, other.expansion_limit);
 }
 
 }  // namespace
