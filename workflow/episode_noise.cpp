@@ -1,5 +1,7 @@
 #include "workflow/episode_noise.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
 #include <numbers>
@@ -75,9 +77,8 @@ bool AddMeasured(const std::string& text, EpisodeNoise& noise) {
     std::istringstream number(text.substr(equals + 1));
     double value = 0.0;
     if (!(number >> value) || !number.eof() || !(value >= measured.least && value <= measured.most)) {
-      throw InputError(
-          "noise", "'" + text + "' has no sensible number",
-          "give " + name + "=NUMBER of " + std::to_string(measured.least) + " to " + std::to_string(measured.most));
+      throw InputError("noise", "'" + text + "' has no sensible number",
+                       fmt::format("give {}=NUMBER of {} to {}", name, measured.least, measured.most));
     }
     measured.add(noise, value);
     return true;

@@ -289,7 +289,7 @@ TEST(Executor, AdversarialPoliciesEndWithAReason) {
   EndlessPolicy endless;
   EXPECT_NE(run(endless).find("limit"), std::string::npos);
   ThrowingPolicy throwing;
-  EXPECT_EQ(run(throwing), "exception: no idea");
+  EXPECT_EQ(run(throwing), "policy threw: no idea");
 }
 
 TEST(Executor, OptionsOutOfRangeAreRefused) {
