@@ -23,8 +23,8 @@ struct TaskModel {
   std::shared_ptr<const mjModel> model;
   int tool_body = -1;
   int target_body = -1;
-  std::vector<int> tool_geoms;    ///< can collide
-  std::vector<int> target_geoms;  ///< can collide
+  std::vector<int> tool_geoms;      ///< can collide
+  std::vector<int> target_geoms;    ///< can collide
   std::vector<int> lid_geoms;       ///< of the target; close the opening in the contact map, ignored by physics
   std::vector<int> tool_lid_geoms;  ///< the same of a tool that has the opening
 };
