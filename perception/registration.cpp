@@ -22,6 +22,8 @@ constexpr double kCoarseSpacing_m = 0.014;
 constexpr double kLink_m = 0.02;  // cubes of points that touch belong together
 constexpr double kNear_m = 0.012;
 constexpr int kLeastModelPoints = 50;
+constexpr double kSureFitness = 0.92;  // below, the search is repeated with more starts and all points near a cluster
+constexpr double kSureRms_m = 0.0015;  // above, likewise
 
 SurfacePoints Checked(const SurfacePoints& surface) {
   const auto finite = [](const Eigen::Vector3d& v) { return v.allFinite(); };
@@ -246,9 +248,21 @@ Eigen::Vector3d Mean(const Points& points) {
   return sum / static_cast<double>(points.size());
 }
 
+/// Where fits of a cluster start: the middle of what is seen of the model at its middle, or, thorough, around it as
+/// well, for clusters of which a part is hidden.
+std::vector<Eigen::Vector3d> StartOffsets(bool thorough, double radius_m) {
+  std::vector<Eigen::Vector3d> offsets = {Eigen::Vector3d::Zero()};
+  if (!thorough) return offsets;
+  constexpr double kAside = 0.5;  // of the model's radius
+  for (const double sign : {-1.0, 1.0}) {
+    for (int axis = 0; axis < 3; ++axis) offsets.push_back(sign * kAside * radius_m * Eigen::Vector3d::Unit(axis));
+  }
+  return offsets;
+}
+
 /// The fit of one cluster.
 Registration RegisterCluster(const Points& cluster, const TargetModel& model, const Eigen::Matrix3d& orientation,
-                             const Eigen::Vector3d& eye_m, const RegistrationOptions& options) {
+                             const Eigen::Vector3d& eye_m, const RegistrationOptions& options, bool thorough) {
   constexpr double kRoughSpacing_m = 0.016;
   const Points rough_scene = Thinned(cluster, kRoughSpacing_m);
   const NearestPoints rough_tree(rough_scene);
@@ -257,24 +271,31 @@ Registration RegisterCluster(const Points& cluster, const TargetModel& model, co
 
   Pose best = Pose::Identity();
   double best_score = -1.0;
-  for (const double turn : {0.0, options.start_turn_rad, -options.start_turn_rad}) {
+  const std::vector<Eigen::Vector3d> offsets = StartOffsets(thorough, model.radius_m());
+  std::vector<double> turns = {0.0, options.start_turn_rad, -options.start_turn_rad};
+  if (thorough) turns.insert(turns.end(), {2.0 * options.start_turn_rad, -2.0 * options.start_turn_rad});
+  for (const double turn : turns) {
     if (turn != 0.0 && options.rotation_axes.empty()) continue;
-    Pose pose = Pose::Identity();
-    pose.linear() = orientation;
-    if (turn != 0.0) pose.linear() = orientation * Eigen::AngleAxisd(turn, options.rotation_axes.front());
+    Pose start = Pose::Identity();
+    start.linear() = orientation;
+    if (turn != 0.0) start.linear() = orientation * Eigen::AngleAxisd(turn, options.rotation_axes.front());
     // The middle of what can be seen of the model goes to the middle of the cluster.
-    pose.translation() = centre - pose.linear() * model.center_m();
+    start.translation() = centre - start.linear() * model.center_m();
     Eigen::Vector3d seen = Eigen::Vector3d::Zero();
-    const std::vector<std::size_t> visible = Visible(model.coarse(), pose.inverse() * eye_m);
+    const std::vector<std::size_t> visible = Visible(model.coarse(), start.inverse() * eye_m);
     for (const std::size_t i : visible) seen += model.coarse().surface.points[i];
     if (visible.empty()) continue;
-    pose.translation() = centre - pose.linear() * (seen / static_cast<double>(visible.size()));
-    Refine(rough, 0.08, 0.04, 12, pose);
-    const Quality quality = Judge(rough, ViewOf(rough, pose), pose);
-    const double score = quality.fitness + quality.explained - quality.rms_m / kNear_m;
-    if (score > best_score) {
-      best_score = score;
-      best = pose;
+    start.translation() = centre - start.linear() * (seen / static_cast<double>(visible.size()));
+    for (const Eigen::Vector3d& offset : offsets) {
+      Pose pose = start;
+      pose.translation() += offset;
+      Refine(rough, 0.08, 0.04, 12, pose);
+      const Quality quality = Judge(rough, ViewOf(rough, pose), pose);
+      const double score = quality.fitness + quality.explained - quality.rms_m / kNear_m;
+      if (score > best_score) {
+        best_score = score;
+        best = pose;
+      }
     }
   }
 
@@ -346,8 +367,20 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
     return best;
   }
   for (const Cluster& cluster : clusters) {
-    Registration fit = RegisterCluster(cluster.points, model, nominal_orientation, eye_m, options);
+    Registration fit = RegisterCluster(cluster.points, model, nominal_orientation, eye_m, options, false);
     if (fit.fitness > best.fitness) best = std::move(fit);
+  }
+  if (best.fitness < kSureFitness || best.rms_m > kSureRms_m) {
+    // Something may stand before the target and cut it in two: all that is near belongs to it, and fits start aside
+    // too.
+    for (const Cluster& cluster : clusters) {
+      Points company;
+      for (const Eigen::Vector3d& p : thinned) {
+        if ((p - cluster.densest_m).norm() < 2.0 * model.radius_m()) company.push_back(p);
+      }
+      Registration fit = RegisterCluster(company, model, nominal_orientation, eye_m, options, true);
+      if (fit.fitness - fit.rms_m / kNear_m > best.fitness - best.rms_m / kNear_m) best = std::move(fit);
+    }
   }
   best.found = best.fitness >= options.least_fitness;
   if (!best.found) {
