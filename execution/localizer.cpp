@@ -1,17 +1,16 @@
 #include "execution/localizer.h"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <set>
 #include <utility>
 
 #include "execution/continuous_travel.h"
 #include "execution/fall_in.h"
+#include "execution/policy_call.h"
 
 namespace feeler::execution {
 namespace {
@@ -23,24 +22,6 @@ constexpr double kShortestFast = 0.75;
 
 /// A chamfer is read up to this much deeper than the face around it, cells.
 constexpr double kRim = 0.6;
-
-double ThreadCpuSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// What a policy throws in the middle of an episode is a failure of the episode.
-template <class Call>
-auto Guarded(const Call& call) {
-  try {
-    return call();
-  } catch (const std::exception& error) {
-    throw ExecutionFailure(fmt::format("policy threw: {}", error.what()));
-  } catch (...) {
-    throw ExecutionFailure("policy threw: no standard exception");
-  }
-}
 
 /// A touch from coordinate `from` along the direction to where the motion ended, at the place across where it ended.
 Touch MakeTouch(Direction direction, double from, const MotionReport& report) {
@@ -72,17 +53,11 @@ policies::Belief Localizer::View() const {
 
 policies::Decision Localizer::Ask() {
   const policies::Belief belief = View();
-  const double before = ThreadCpuSeconds();
-  policies::Decision decision = Guarded([&] { return policy_.Next(belief); });
-  record_.policy_cpu_s += ThreadCpuSeconds() - before;
-  return decision;
+  return CallPolicy(record_, [&] { return policy_.Next(belief); });
 }
 
 bool Localizer::Tell(const Outcome& outcome) {
-  const double before = ThreadCpuSeconds();
-  const bool known = Guarded([&] { return policy_.Observe(outcome); });
-  record_.policy_cpu_s += ThreadCpuSeconds() - before;
-  return known;
+  return CallPolicy(record_, [&] { return policy_.Observe(outcome); });
 }
 
 policies::Decision Localizer::Run() {

@@ -9,6 +9,8 @@
 #include <utility>
 #include <variant>
 
+#include "execution/policy_call.h"
+
 namespace feeler::execution {
 namespace {
 
@@ -48,13 +50,15 @@ double PolicyWalk::Predict(const Tracked& tracked, const GuardedMove& move) cons
 }
 
 policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt, const std::function<bool()>& enough) {
+  const double before = ThreadCpuSeconds();
   policy_.Begin(problem_);
+  record_.policy_cpu_s += ThreadCpuSeconds() - before;
   if (record_.attempts++ == 0) record_.hypotheses = static_cast<int>(problem_.hypotheses.size());
   while (true) {
     policies::Belief belief;
     belief.robot = robot_;
     for (const Tracked& t : tracked_) belief.hypotheses.push_back(t.hypothesis);
-    const policies::Decision decision = policy_.Next(belief);
+    const policies::Decision decision = CallPolicy(record_, [&] { return policy_.Next(belief); });
     const auto* move = std::get_if<GuardedMove>(&decision);
     if (move == nullptr || tracked_.size() == 1) {
       const auto* insert = std::get_if<policies::Insert>(&decision);
@@ -166,7 +170,7 @@ bool PolicyWalk::TakeOver(const GuardedMove& move, const Reading& reading) {
   for (const auto& entry : branches) ranked.push_back(entry.second);
   std::stable_sort(ranked.begin(), ranked.end(), [](const Branch& a, const Branch& b) { return a.misfit < b.misfit; });
   for (const Branch& branch : ranked) {
-    if (!policy_.Observe(branch.outcome)) continue;
+    if (!CallPolicy(record_, [&] { return policy_.Observe(branch.outcome); })) continue;
     std::vector<Tracked> left;
     for (const Tracked& t : tracked_) {
       if (problem_.map->Predict(robot_ - t.hypothesis.offset, move, t.hypothesis.orientation) == branch.outcome) {

@@ -1,10 +1,10 @@
 #include "execution/servoing.h"
 
 #include <fmt/format.h>
-#include <time.h>
 
-#include <exception>
 #include <string>
+
+#include "execution/policy_call.h"
 
 namespace feeler::execution {
 namespace {
@@ -12,12 +12,6 @@ namespace {
 /// Pictures of one episode, whatever the policy.
 constexpr int kPictureLimit = 10000;
 constexpr double kStop_s = 0.1;
-
-double ThreadCpuSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 }  // namespace
 
@@ -36,14 +30,10 @@ policies::Decision FollowByEye(const planner::Problem& problem, const policies::
     }
     const CameraView view = mover.Look();
     ++record.pictures;
-    const double before = ThreadCpuSeconds();
-    try {
+    decision = CallPolicy(record, [&] {
       policy.See(view);
-      decision = policy.Next(belief);
-    } catch (const std::exception& error) {
-      throw ExecutionFailure(fmt::format("policy threw: {}", error.what()));
-    }
-    record.policy_cpu_s += ThreadCpuSeconds() - before;
+      return policy.Next(belief);
+    });
   }
   if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
     throw LostTrack("policy gave up: " + give_up->reason);
