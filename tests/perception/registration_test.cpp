@@ -1,7 +1,7 @@
 // Laws: registration recovers a known pose from noisy points, wherever the target stands (oracle: the pose that made
 // the scene); a rigid motion of camera, scene and nominal orientation moves the result along; the order of points does
-// not matter, bit for bit; points that are not finite do not either; other things beside the target do not draw it
-// away; nothing, too little, and something else than the target are "not found", with a reason.
+// not matter, bit for bit; points that are not finite do not either; other things beside the target and before it do
+// not draw it away; nothing, too little, and something else than the target are "not found", with a reason.
 #include "perception/registration.h"
 
 #include <gtest/gtest.h>
@@ -91,6 +91,26 @@ TEST(Registration, OrderAndBrokenPointsDoNotMatter) {
   }
   EXPECT_EQ(Register(scene, Model(), kUpright, kEye).world_T_target.matrix(),
             Register(shuffled, Model(), kUpright, kEye).world_T_target.matrix());
+}
+
+TEST(Registration, ABarThatCutsItInTwoDoesNotDrawItAway) {
+  RandomStream random(7, 0, "bars");
+  for (std::uint64_t k = 0; k < 8; ++k) {
+    const Pose truth = DrawPose(random);
+    const double angle = random.Uniform(0.0, std::numbers::pi);
+    const Eigen::Vector2d across(std::cos(angle), std::sin(angle));
+    const double middle = random.Uniform(-0.04, 0.04);
+    constexpr double kHalfWidth_m = 0.03;
+    Points scene = SyntheticScene(truth, kEye, 0.002, k);
+    std::erase_if(scene, [&](const Eigen::Vector3d& p) {
+      const Eigen::Vector3d q = truth.inverse() * p;
+      return std::abs(q.head<2>().dot(across) - middle) < kHalfWidth_m;
+    });
+    const Registration found = Register(scene, Model(), kUpright, kEye);
+    ASSERT_TRUE(found.found) << k << ": " << found.reason;
+    EXPECT_LT((found.world_T_target.translation() - truth.translation()).norm(), 0.004) << k;
+    EXPECT_LT(Turn(found.world_T_target, truth), 0.02) << k;
+  }
 }
 
 TEST(Registration, OtherThingsDoNotDrawItAway) {
