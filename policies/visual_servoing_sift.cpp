@@ -47,6 +47,7 @@ std::vector<FeatureMatch> Consensus(const std::vector<FeatureMatch>& matches, do
     if (agreeing.size() > best.size()) best = std::move(agreeing);
   }
   std::vector<FeatureMatch> result;
+  result.reserve(best.size());
   for (const std::size_t i : best) result.push_back(matches[i]);
   return result;
 }

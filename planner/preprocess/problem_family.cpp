@@ -115,6 +115,7 @@ std::vector<AxisKind> AxesOf(const Task& task) {
 
 std::vector<int> CountsAlong(const std::vector<AxisKind>& axes, const Extents& extents) {
   std::vector<int> counts;
+  counts.reserve(axes.size());
   for (const AxisKind axis : axes) counts.push_back(extents[axis]);
   return counts;
 }
@@ -128,7 +129,7 @@ Extents ExtentsAlong(const std::vector<AxisKind>& axes, const std::vector<int>& 
 }
 
 std::string ToString(const Extents& extents) {
-  const std::string positions = fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz);
+  std::string positions = fmt::format("{}x{}x{}", extents.nx, extents.ny, extents.nz);
   if (extents.n_yaw == 1 && extents.n_pitch == 1) return positions;
   return fmt::format("{}x{}x{}", positions, extents.n_yaw, extents.n_pitch);
 }
