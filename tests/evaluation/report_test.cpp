@@ -3,6 +3,7 @@
 // complaint, draws, and plays, by pointer and keyboard; a thousand episodes stay small and open quickly.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,8 +24,17 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+/// Of this process alone: tests run side by side. Removed at its end.
 std::string NewFolder(const std::string& name) {
-  const fs::path folder = fs::path(::testing::TempDir()) / ("report_" + name);
+  struct Parent {
+    fs::path path = fs::path(::testing::TempDir()) / ("feeler_report_" + std::to_string(getpid()));
+    ~Parent() {
+      std::error_code ignored;
+      fs::remove_all(path, ignored);
+    }
+  };
+  static const Parent parent;
+  const fs::path folder = parent.path / name;
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder.string();
