@@ -165,7 +165,9 @@ std::string SectionText(const Section& section) {
 planner::ProblemFamily UpTo(planner::ProblemFamily family, int most, int other_most) {
   if (most == 0 || (other_most > 0 && other_most < most)) most = other_most;
   if (most == 0) return family;
-  std::erase_if(family.problems, [most](const planner::Extents& e) { return std::max({e.nx, e.ny, e.nz, e.n_yaw, e.n_pitch}) > most; });
+  std::erase_if(family.problems, [most](const planner::Extents& e) {
+    return std::max({e.nx, e.ny, e.nz, e.n_yaw, e.n_pitch}) > most;
+  });
   family.spec += fmt::format(" up to {} cells per axis", most);
   return family;
 }
@@ -259,8 +261,9 @@ TableRow OverFamily(TableRow row) {
 
 ExperimentResult RunDatabaseTable(const PlanningCase& planning_case, DatabaseTable table,
                                   const SampleProtocol& protocol, const ExperimentRequest& request) {
-  const planner::ProblemFamily family =
-      protocol.family.empty() ? planner::FamilyOf(planning_case.task) : planner::ParseProblemFamily(protocol.family, planning_case.task);
+  const planner::ProblemFamily family = protocol.family.empty()
+                                            ? planner::FamilyOf(planning_case.task)
+                                            : planner::ParseProblemFamily(protocol.family, planning_case.task);
   const planner::ProblemFamily sample = DrawSample(family, protocol.strata, protocol.per_stratum, request.seed);
   ExperimentResult result;
   const int solver_seeds = request.solver_seeds > 0 ? request.solver_seeds : protocol.solver_seeds;

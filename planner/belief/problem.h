@@ -30,8 +30,8 @@ struct Problem {
   /// Goal `insertable`: the largest spread (greatest minus least offset, per axis, in cells) that one motion still
   /// inserts; all hypotheses left must share an orientation. Unused under goal `singleton`.
   Cell insertable_spread = Cell::Zero();
-  /// Orientations are a lattice of two angles: orientation = yaw index * pitches + pitch index. Which ones are neighbours
-  /// is of use to lower bounds only; any number is right.
+  /// Orientations are a lattice of two angles: orientation = yaw index * pitches + pitch index. Which ones are
+  /// neighbours is of use to lower bounds only; any number is right.
   int pitches = 1;
   CellBox workspace;  ///< cells r may occupy; a guarded move is applicable if its far end lies inside
 
