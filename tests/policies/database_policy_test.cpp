@@ -13,42 +13,10 @@
 #include "core/error.h"
 #include "planner/preprocess/problem_family.h"
 #include "planner/solver/solve.h"
+#include "tests/policies/block_problem.h"
 
 namespace feeler::policies {
 namespace {
-
-/// A block of 5 x 5 x 4 cells on a floor, walls mid-cell.
-std::shared_ptr<const planner::ContactMap> BlockMap() {
-  const CellBox domain{Cell(-14, -14, -6), Cell(14, 14, 14)};
-  const auto blocked = [](const Cell& d) {
-    return d.z() < -4 || (std::abs(d.x()) <= 2 && std::abs(d.y()) <= 2 && d.z() < 0);
-  };
-  planner::ContactMap::Layer layer;
-  for (int z = domain.min.z(); z <= domain.max.z(); ++z) {
-    for (int y = domain.min.y(); y <= domain.max.y(); ++y) {
-      for (int x = domain.min.x(); x <= domain.max.x(); ++x) {
-        const Cell here(x, y, z);
-        layer.blocked.push_back(blocked(here) ? 1 : 0);
-        for (const Direction d : kDirections) {
-          float travel = 0.5F;
-          Cell next = here + UnitCell(d);
-          for (; domain.Contains(next) && !blocked(next); next += UnitCell(d)) travel += 1.0F;
-          if (!domain.Contains(next)) travel = planner::ContactMap::kUnlimited;
-          layer.travel[IndexOf(d)].push_back(blocked(here) ? 0.0F : travel);
-        }
-      }
-    }
-  }
-  return std::make_shared<planner::ContactMap>(domain, std::vector<planner::ContactMap::Layer>{layer},
-                                               Eigen::Vector3d::Zero(), 0.5);
-}
-
-planner::Problem BlockProblem() {
-  Task task;
-  task.start_offset_m = {0.0, 0.0, 0.008};
-  task.axes = {{AxisKind::kX, 0.002, 2, 15}, {AxisKind::kY, 0.002, 2, 15}, {AxisKind::kZ, 0.002, 2, 15}};
-  return planner::MakeCuboidProblem(task, BlockMap(), {3, 3, 3});
-}
 
 std::shared_ptr<const planner::Policy> Solved(const planner::Problem& problem) {
   const planner::SolverResult result =
@@ -58,7 +26,7 @@ std::shared_ptr<const planner::Policy> Solved(const planner::Problem& problem) {
 }
 
 TEST(DatabasePolicy, EndsAtTheLeafOfTheTrueHypothesis) {
-  const planner::Problem problem = BlockProblem();
+  const planner::Problem problem = SmallBlockProblem({3, 3, 3});
   const auto graph = Solved(problem);
   ASSERT_TRUE(graph);
   DatabasePolicy policy(graph);
@@ -88,7 +56,7 @@ TEST(DatabasePolicy, EndsAtTheLeafOfTheTrueHypothesis) {
 }
 
 TEST(DatabasePolicy, UnknownOutcomeIsRefusedAndChangesNothing) {
-  const planner::Problem problem = BlockProblem();
+  const planner::Problem problem = SmallBlockProblem({3, 3, 3});
   const auto graph = Solved(problem);
   ASSERT_TRUE(graph);
   DatabasePolicy policy(graph);
