@@ -43,6 +43,7 @@ void Run(const Flags& flags, Session& session) {
   }
 
   ProgressBar map_bar("contact map");
+  ProgressBar database_bar("policies");
   ProgressBar bar(flags.name);
   evaluation::ExperimentRequest request;
   request.out = flags.out;
@@ -57,9 +58,11 @@ void Run(const Flags& flags, Session& session) {
                                 flags.seed, request.jobs.threads());
   request.cancellation = session.cancellation;
   request.map_progress = map_bar.Callback();
+  request.database_progress = database_bar.Callback();
   request.progress = bar.Callback();
   const evaluation::ExperimentOutcome outcome = evaluation::RunExperiment(experiment, request);
   map_bar.Finish();
+  database_bar.Finish();
   bar.Finish();
   if (!outcome.complete) {
     fmt::print(stderr, "interrupted: what is done is kept in {}; run the same command again to go on\n",

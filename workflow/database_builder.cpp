@@ -20,10 +20,8 @@
 namespace feeler::workflow {
 namespace {
 
-/// What each problem is solved with.
-planner::SolverOptions Budgeted(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
-  return planner::WithFamilyBudget(options.solver, {.openings = setup.opening == env::Opening::kOpen,
-                                                    .orientations = LatticeOrientations(setup.task()) > 1});
+planner::FamilyTraits TraitsOf(const PlanningSetup& setup) {
+  return {.openings = setup.opening == env::Opening::kOpen, .orientations = LatticeOrientations(setup.task()) > 1};
 }
 
 /// Null where there is no limit: JSON has no infinity.
@@ -32,7 +30,7 @@ nlohmann::json Limit(double value) { return std::isfinite(value) ? nlohmann::jso
 }  // namespace
 
 policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
-  const planner::SolverOptions solver = Budgeted(setup, options);
+  const planner::SolverOptions solver = planner::WithFamilyBudget(options.solver, TraitsOf(setup));
   nlohmann::json settings = {
       {"solver", planner::ToString(solver.solver)},
       {"heuristic", planner::ToString(solver.heuristic)},
@@ -41,6 +39,12 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
       {"expansion_limit", solver.expansion_limit},
       {"seed", solver.seed},
   };
+  const std::int64_t small_limit =
+      planner::WithFamilyBudget(options.solver, TraitsOf(setup), planner::kSmallOrientedHypotheses).expansion_limit;
+  if (small_limit != solver.expansion_limit) {
+    settings["expansion_limit_small"] = {{"hypotheses", planner::kSmallOrientedHypotheses},
+                                         {"expansions", small_limit}};
+  }
   if (solver.solver == planner::SolverKind::kCertified) {
     settings["gap"] = solver.gap;
   } else {
@@ -82,11 +86,11 @@ void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
                             const planner::PreprocessOptions& options, const std::string& path) {
   policies::Database database = policies::Database::OpenOrCreate(path, IdentityOf(setup, options));
-  planner::PreprocessOptions budgeted = options;
-  budgeted.solver = Budgeted(setup, options);
-  policies::DatabaseSink sink(database, budgeted.solver);
+  planner::PreprocessOptions of_setup = options;
+  of_setup.openings = setup.opening == env::Opening::kOpen;
+  policies::DatabaseSink sink(database, options.solver);
   DatabaseBuild build;
-  build.summary = planner::Preprocess(setup.task(), setup.map, family, budgeted, sink);
+  build.summary = planner::Preprocess(setup.task(), setup.map, family, of_setup, sink);
   build.info = database.Info();
   return build;
 }

@@ -35,12 +35,16 @@ std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid) {
   return planner::CountsAlong(planner::AxesOf(task), cuboid);
 }
 
+planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t seed, std::uint64_t episode) {
+  if (family.problems.empty()) throw InputError("episodes", "no problem to draw from", "give --extents or a database");
+  RandomStream problem(seed, episode, "problem");
+  return family.problems[problem.Index(family.problems.size())];
+}
+
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
                         std::uint64_t episode, const EpisodeNoise& noise) {
-  if (family.problems.empty()) throw InputError("episodes", "no problem to draw from", "give --extents or a database");
   EpisodeDraw draw;
-  RandomStream problem(seed, episode, "problem");
-  draw.extents = family.problems[problem.Index(family.problems.size())];
+  draw.extents = DrawProblem(family, seed, episode);
   draw.world_T_estimate = task.world_T_target;
 
   RandomStream truth(seed, episode, "true pose");

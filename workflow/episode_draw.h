@@ -34,7 +34,10 @@ struct EpisodeDraw {
 /// Hypotheses per axis of the task, in the order of its axes.
 std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid);
 
-/// Episode k of a seed, the same alone or among thousands: a problem uniform in the family, and a true offset uniform
+/// The problem that episode k of a seed meets: uniform in the family. Throws InputError for an empty family.
+planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t seed, std::uint64_t episode);
+
+/// Episode k of a seed, the same alone or among thousands: its problem, and a true offset uniform
 /// in the lattice span plus half a cell each side along every uncertain axis. `noise` then moves the truth outside of
 /// that box, or turns it; its other parts are not drawn here. Throws InputError for an empty family.
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,

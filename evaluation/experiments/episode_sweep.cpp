@@ -14,6 +14,7 @@
 #include "planner/preprocess/problem_family.h"
 #include "workflow/database_builder.h"
 #include "workflow/episode.h"
+#include "workflow/episode_draw.h"
 #include "workflow/planning_setup.h"
 
 namespace feeler::evaluation {
@@ -168,6 +169,19 @@ struct EpisodeSweep::TaskWorld {
   std::shared_ptr<policies::Database> database;
 };
 
+planner::ProblemFamily EpisodeSweep::ProblemsMet(const std::string& name, const std::string& cost,
+                                                 const Task& task) const {
+  std::set<planner::Extents> met;
+  for (const EpisodeSetting& setting : settings_) {
+    if (setting.task != name || setting.cost != cost) continue;
+    const planner::ProblemFamily family = planner::ParseProblemFamily(setting.extents, task);
+    for (const std::int64_t episode : workflow::EpisodeRange(0, setting.episodes)) {
+      met.insert(workflow::DrawProblem(family, request_.seed, static_cast<std::uint64_t>(episode)));
+    }
+  }
+  return {{met.begin(), met.end()}, "problems met"};
+}
+
 bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, std::int64_t& done, std::int64_t total) {
   workflow::PlanningSetupOptions setup_options;
   setup_options.cost_kind = cost == ToString(CostKind::kTime) ? CostKind::kTime : CostKind::kDistance;
@@ -176,21 +190,14 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
   TaskWorld world;
   world.setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
 
-  std::vector<planner::ProblemFamily> families;
-  std::string spec;
-  std::set<std::string> seen;
-  for (const EpisodeSetting& setting : settings_) {
-    if (setting.task != task || setting.cost != cost || !seen.insert(setting.extents).second) continue;
-    families.push_back(planner::ParseProblemFamily(setting.extents, world.setup->task()));
-    spec += (spec.empty() ? "" : ",") + setting.extents;
-  }
-  const planner::ProblemFamily needed = planner::UnionOf(families, spec);
+  const planner::ProblemFamily needed = ProblemsMet(task, cost, world.setup->task());
   workflow::RequireWithinTask(needed, world.setup->task());
   planner::PreprocessOptions build;
   build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   build.solver.gap = kGap;
   build.jobs = request_.jobs;
   build.cancellation = request_.cancellation;
+  build.progress = request_.database_progress;
   const std::string database_file = request_.out + "/databases/" + world.setup->task().name + "-" + cost + ".db";
   if (workflow::BuildDatabase(*world.setup, needed, build, database_file).summary.cancelled) return false;
   world.database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(database_file));

@@ -8,6 +8,7 @@
 
 #include "evaluation/experiments/experiment.h"
 #include "evaluation/statistics.h"
+#include "planner/preprocess/problem_family.h"
 
 namespace feeler::evaluation {
 
@@ -79,6 +80,8 @@ class EpisodeSweep {
  private:
   std::string RecordsFile(const EpisodeSetting& setting) const;
   struct TaskWorld;
+  /// The problems that the episodes of the settings of a task and a cost draw: what their database has to hold.
+  planner::ProblemFamily ProblemsMet(const std::string& name, const std::string& cost, const Task& task) const;
   bool RunGroup(const std::string& task, const std::string& cost, std::int64_t& done, std::int64_t total);
   bool RunSetting(const TaskWorld& world, const EpisodeSetting& setting, std::int64_t done, std::int64_t total);
 

@@ -23,6 +23,7 @@ struct ExperimentRequest {
   std::string command;                              ///< for the manifest
   const CancellationToken* cancellation = nullptr;  ///< may be null
   ProgressCallback map_progress;                    ///< while a contact map is built
+  ProgressCallback database_progress;               ///< while policies for episodes are solved
   ProgressCallback progress;                        ///< cells done, of all
 };
 

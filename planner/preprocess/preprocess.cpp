@@ -23,11 +23,14 @@ constexpr std::size_t kLookAhead = 256;
 /// Budget of the certified solver for a problem where none is given.
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
 constexpr std::int64_t kDefaultExpansionLimitOrientations = 6000;
+constexpr std::int64_t kDefaultExpansionLimitSmallOrientations = 60000;
 constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
 
-std::int64_t DefaultExpansionLimit(const FamilyTraits& family) {
+std::int64_t DefaultExpansionLimit(const FamilyTraits& family, std::size_t hypotheses) {
   if (family.openings) return kDefaultExpansionLimitOpen;
-  return family.orientations ? kDefaultExpansionLimitOrientations : kDefaultExpansionLimit;
+  if (!family.orientations) return kDefaultExpansionLimit;
+  return hypotheses <= kSmallOrientedHypotheses ? kDefaultExpansionLimitSmallOrientations
+                                                : kDefaultExpansionLimitOrientations;
 }
 
 class Framework {
@@ -39,7 +42,8 @@ class Framework {
         family_(family),
         options_(options),
         sink_(sink),
-        solver_(WithFamilyBudget(options.solver, {.orientations = LatticeOrientations(task) > 1})),
+        traits_{.openings = options.openings, .orientations = LatticeOrientations(task) > 1},
+        solver_(options.solver),
         order_(OrderOf(family, options.order, options.seed)),
         states_(order_.size()) {
     solver_.on_bounds = nullptr;
@@ -54,7 +58,8 @@ class Framework {
     if (!order_.empty()) {
       tables_ = options_.tables;
       if (!tables_)
-        tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)), solver_, options_.jobs);
+        tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)),
+                                      WithFamilyBudget(solver_, traits_), options_.jobs);
       MarkStored();
       std::vector<std::jthread> threads;
       for (int i = 1; i < options_.jobs.threads(); ++i) threads.emplace_back([this] { Work(); });
@@ -155,7 +160,8 @@ class Framework {
           similar_problem = MakeCuboidProblem(task_, map_, At(similar));
           experience = {options_.experience, &*similar_problem, policy.get()};
         }
-        SolverResult result = Solve(problem, solver_, tables_, experience);
+        SolverResult result =
+            Solve(problem, WithFamilyBudget(solver_, traits_, problem.hypotheses.size()), tables_, experience);
         lock.lock();
         if (result.status == SolverStatus::kCancelled) break;
         sink_.Store(At(k), problem, result);
@@ -180,6 +186,7 @@ class Framework {
   const ProblemFamily& family_;
   const PreprocessOptions& options_;
   PolicySink& sink_;
+  FamilyTraits traits_;
   SolverOptions solver_;
   bool needs_experience_ = false;
   std::vector<std::size_t> order_;
@@ -196,10 +203,10 @@ class Framework {
 
 }  // namespace
 
-SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family) {
+SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family, std::size_t hypotheses) {
   if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
       solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
-    solver.expansion_limit = DefaultExpansionLimit(family);
+    solver.expansion_limit = DefaultExpansionLimit(family, hypotheses);
   }
   if (solver.solver == SolverKind::kCertified && solver.gap < kTightGap && solver.cuboids_where_tight &&
       solver.heuristic == HeuristicKind::kCertificate) {

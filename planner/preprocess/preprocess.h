@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -30,16 +32,21 @@ struct FamilyTraits {
   bool orientations = false;  ///< the orientation of the target is uncertain
 };
 
-/// The options that each problem of a family is solved with: the certified solver without any limit is given 20,000
-/// expansions a problem, so that one problem whose gap cannot be closed never holds up the family (6,000 with uncertain
-/// orientations, whose large problems stay open whatever they are given; 500 where the map has openings: the first
-/// policy and the bound at the start are all there, and the search between them adds nothing); at a gap below kTightGap
-/// it takes cuboids for certificates, unless told not to.
-SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {});
+/// Problems of uncertain orientations up to this size are worth ten times the expansions of larger ones.
+inline constexpr int kSmallOrientedHypotheses = 600;
+
+/// The options that a problem of so many hypotheses in a family is solved with: the certified solver without any limit
+/// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
+/// orientations 60,000 up to kSmallOrientedHypotheses, whose gaps close, and 6,000 above, where they stay open whatever
+/// is given. 500 where the map has openings: the first policy and the bound at the start are all there, and the search
+/// between them adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
+SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
+                               std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
 
 struct PreprocessOptions {
-  /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them.
+  /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them for each problem.
   SolverOptions solver;
+  bool openings = false;  ///< FamilyTraits::openings: the map does not tell
   ProblemOrder order = ProblemOrder::kUncertainty;
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
   std::uint64_t seed = 1;                                ///< of the random order

@@ -110,6 +110,12 @@ TEST(FamilyBudget, KeepsWhatWasSet) {
   EXPECT_LT(open, oriented);
   EXPECT_LT(oriented, closed);
   EXPECT_LT(closed, unlimited.expansion_limit);
+  const auto of_size = [&](const FamilyTraits& family, std::size_t hypotheses) {
+    return WithFamilyBudget(unlimited, family, hypotheses).expansion_limit;
+  };
+  EXPECT_LT(oriented, of_size({.orientations = true}, kSmallOrientedHypotheses));
+  EXPECT_EQ(oriented, of_size({.orientations = true}, kSmallOrientedHypotheses + 1));
+  EXPECT_EQ(closed, of_size({}, 8)) << "size counts with orientations alone";
 
   SolverOptions limited = unlimited;
   limited.expansion_limit = 123456;
