@@ -1,0 +1,117 @@
+#include "policies/storage/meta.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "core/error.h"
+#include "policies/formats/bytes.h"
+#include "policies/storage/file_checks.h"
+#include "policies/storage/hash.h"
+
+namespace feeler::policies {
+namespace {
+
+using nlohmann::json;
+
+std::vector<AxisKind> ParseAxes(const std::string& text, const std::string& path) {
+  std::vector<AxisKind> axes;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(',', at), text.size());
+    const std::string word = text.substr(at, end - at);
+    int kind = 0;
+    while (kind < planner::kAxisKinds && ToString(static_cast<AxisKind>(kind)) != word) ++kind;
+    if (kind == planner::kAxisKinds) throw Damaged(path, "table meta names an unknown axis");
+    axes.push_back(static_cast<AxisKind>(kind));
+    at = end + 1;
+  }
+  return axes;
+}
+
+json CostJson(const CostWeights& cost) {
+  return {{"per_cell", cost.per_cell}, {"per_contact", cost.per_contact}, {"per_action", cost.per_action}};
+}
+
+}  // namespace
+
+std::string MetaChecksum(const Meta& meta) {
+  ByteWriter out;
+  for (const auto& [key, value] : meta) {
+    if (key == kMetaChecksum) continue;
+    out.Text(key);
+    out.Text(value);
+  }
+  return fmt::format("{:016x}", Hash64(out.bytes()));
+}
+
+Meta ReadMeta(const SqliteConnection& connection, const std::string& path) {
+  Meta meta;
+  SqliteStatement statement(connection, "SELECT key, value FROM meta");
+  while (statement.Step()) meta[statement.Text(0)] = statement.Text(1);
+  if (meta[kMetaChecksum] != MetaChecksum(meta)) throw Damaged(path, "table meta is altered");
+  return meta;
+}
+
+void WriteMeta(const SqliteConnection& connection, const Meta& meta) {
+  SqliteStatement statement(connection, "INSERT OR REPLACE INTO meta (key, value) VALUES (?, ?)");
+  for (const auto& [key, value] : meta) {
+    statement.Bind(1, std::string_view(key)).Bind(2, std::string_view(value)).Step();
+    statement.Reset();
+  }
+}
+
+std::string AxesText(const std::vector<AxisKind>& axes) {
+  std::string text;
+  for (const AxisKind axis : axes) text += (text.empty() ? "" : ",") + std::string(ToString(axis));
+  return text;
+}
+
+Meta ToMeta(const DatabaseIdentity& identity) {
+  const json settings = json::parse(identity.settings, nullptr, false);
+  if (!settings.is_object()) throw std::invalid_argument("DatabaseIdentity: settings is not a JSON object");
+  return {{"task", identity.task},
+          {"fingerprint", identity.fingerprint},
+          {"opening", identity.opening},
+          {"goal", identity.goal},
+          {"cost", CostJson(identity.cost).dump()},
+          {"settings", settings.dump()},
+          {"created_by", identity.created_by}};
+}
+
+DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
+  try {
+    const json cost = json::parse(meta.at("cost"));
+    DatabaseIdentity identity{meta.at("task"),
+                              meta.at("fingerprint"),
+                              meta.at("opening"),
+                              meta.at("goal"),
+                              {cost.at("per_cell"), cost.at("per_contact"), cost.at("per_action")},
+                              meta.at("settings"),
+                              meta.at("created_by")};
+    const auto axes = meta.find(kMetaAxes);
+    if (axes != meta.end()) identity.axes = ParseAxes(axes->second, path);
+    return identity;
+  } catch (const std::exception&) {  // a key is missing or is not JSON
+    throw Damaged(path, "table meta lacks an entry");
+  }
+}
+
+void RequireSameIdentity(const Meta& stored, const DatabaseIdentity& identity, const std::string& path) {
+  const Meta wanted = ToMeta(identity);
+  // The fingerprint covers costs and goal, too: they are named first.
+  for (const char* key : {"task", "cost", "opening", "goal", "fingerprint", "settings"}) {
+    const std::string& have = stored.at(key);
+    const std::string& want = wanted.at(key);
+    if (have == want) continue;
+    if (std::string_view(key) == "fingerprint") {
+      throw InputError(path, "was made for another geometry of task " + identity.task + " (its fingerprint differs)",
+                       "write to another file, or delete this one");
+    }
+    throw InputError(path, fmt::format("was made with another {} ({}, not {})", key, have, want),
+                     "use the same settings to continue it, or write to another file");
+  }
+}
+
+}  // namespace feeler::policies
