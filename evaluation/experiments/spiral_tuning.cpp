@@ -25,20 +25,24 @@ std::vector<Row> RowsOf(bool quick) {
   struct Socket {
     const char* task;
     std::vector<double> pitch_mm;
+    std::vector<double> speeds_mm_s;
   };
-  // Around the clearance of the socket (0.5 and 0.2 mm), chamfer (1 and 0.3 mm) included.
-  std::vector<Socket> sockets = {{"plug", {0.75, 1.0, 1.5, 2.0, 2.5}}, {"plug-tight", {0.2, 0.3, 0.4, 0.6, 0.8}}};
-  std::vector<double> speeds_mm_s = {20, 40, 80};
-  std::vector<double> forces_n = {5, 10, 20};
+  // Around the clearance of the socket (0.5 and 0.2 mm), chamfer (1 and 0.3 mm) included, and wide
+  // enough that the best lies within.
+  std::vector<Socket> sockets = {{"plug", {1.0, 1.5, 2.0, 2.5, 3.5}, {40, 80, 120}},
+                                 {"plug-tight", {0.3, 0.4, 0.6, 0.8, 1.1}, {20, 40, 80}}};
+  std::vector<double> forces_n = {10, 20, 40};
   if (quick) {
-    for (Socket& socket : sockets) socket.pitch_mm = {socket.pitch_mm[1], socket.pitch_mm[3]};
-    speeds_mm_s = {40};
-    forces_n = {10};
+    for (Socket& socket : sockets) {
+      socket.pitch_mm = {socket.pitch_mm[1], socket.pitch_mm[3]};
+      socket.speeds_mm_s = {40};
+    }
+    forces_n = {20};
   }
   std::vector<Row> rows;
   for (const Socket& socket : sockets) {
     for (const double pitch_mm : socket.pitch_mm) {
-      for (const double speed_mm_s : speeds_mm_s) {
+      for (const double speed_mm_s : socket.speeds_mm_s) {
         for (const double force_n : forces_n) {
           Row row;
           row.tuning = {1e-3 * pitch_mm, 1e-3 * speed_mm_s, force_n};
