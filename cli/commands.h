@@ -12,6 +12,7 @@ void AddSolveCommand(CLI::App& app, Session& session);
 void AddPreprocessCommand(CLI::App& app, Session& session);
 void AddDbCommand(CLI::App& app, Session& session);
 void AddRunCommand(CLI::App& app, Session& session);
+void AddAssembleCommand(CLI::App& app, Session& session);
 void AddPerceiveCommand(CLI::App& app, Session& session);
 void AddExportCommand(CLI::App& app, Session& session);
 void AddPolicyCommand(CLI::App& app, Session& session);

@@ -59,6 +59,7 @@ int main(int argc, char** argv) {
   feeler::cli::AddPreprocessCommand(app, session);
   feeler::cli::AddDbCommand(app, session);
   feeler::cli::AddRunCommand(app, session);
+  feeler::cli::AddAssembleCommand(app, session);
   feeler::cli::AddPerceiveCommand(app, session);
   feeler::cli::AddExportCommand(app, session);
   feeler::cli::AddPolicyCommand(app, session);

@@ -232,6 +232,7 @@ void AddTaskCommand(CLI::App& app, Session& /*session*/) {
   size("--side-arm", sizes->side_arm_m, "from the axis of the socket to the end of the side arm");
   size("--socket-to-arm", sizes->socket_to_arm_m, "from the mouth of a fixed elbow to the axis of its side arm");
   size("--held-pipe", sizes->held_pipe_m, "length of the pipe in the gripper");
+  size("--joint-pipe", sizes->joint_pipe_m, "length of the pipe with a branch, for structures");
   size("--lid-recess", sizes->lid_recess_m, "from the rim down to the lid that closes the bore for planning");
   pipes->add_option("--out", flags->out, "folder for the files")->required();
   pipes->callback([flags, sizes] { MakePipeParts(*sizes, flags->out); });

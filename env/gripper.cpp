@@ -19,6 +19,15 @@ constexpr double kAdapter_m = 0.012;     // length of the adapter plate on the f
 constexpr double kPalm_m = 0.095;        // where the palm ends, if the tool leaves room
 constexpr double kFingerRoom_m = 0.025;  // least length of finger between palm and tool
 
+// What is round about the approach axis may be gripped from any side.
+bool IsRoundGrip(const mjModel& model, const mjData& data, int geom, const Pose& flange_T_world) {
+  if (model.geom_type[geom] != mjGEOM_CYLINDER && model.geom_type[geom] != mjGEOM_CAPSULE) return false;
+  const mjtNum* matrix = data.geom_xmat + 9 * geom;
+  const Eigen::Vector3d axis = flange_T_world.linear() * Eigen::Vector3d(matrix[2], matrix[5], matrix[8]);
+  const Eigen::Vector3d centre = flange_T_world * Eigen::Map<const Eigen::Vector3d>(data.geom_xpos + 3 * geom);
+  return std::abs(axis.z()) > 1.0 - 1e-9 && centre.head<2>().norm() < 1e-6;
+}
+
 // The corners of a box around a geom, or the vertices of its mesh, in world axes.
 std::vector<Eigen::Vector3d> Extremes(const mjModel& model, const mjData& data, int geom) {
   Pose pose = Pose::Identity();
@@ -72,6 +81,7 @@ GripperFit FitGripper(const mjModel& task_model, const std::vector<int>& tool_ge
   const Pose flange_T_world = flange_T_tool * BodyPose(*data, tool_body).inverse();
 
   struct Extent {
+    int geom = -1;
     double begin = std::numeric_limits<double>::infinity();
     double end = -std::numeric_limits<double>::infinity();
     double half = 0.0;
@@ -81,6 +91,7 @@ GripperFit FitGripper(const mjModel& task_model, const std::vector<int>& tool_ge
   double end = -begin;
   for (const int geom : tool_geoms) {
     Extent extent;
+    extent.geom = geom;
     for (const Eigen::Vector3d& point : Extremes(task_model, *data, geom)) {
       const Eigen::Vector3d p = flange_T_world * point;
       extent.begin = std::min(extent.begin, p.z());
@@ -95,8 +106,20 @@ GripperFit FitGripper(const mjModel& task_model, const std::vector<int>& tool_ge
   fit.grip_begin_m = begin;
   fit.grip_end_m = begin + std::min(kGripDepth_m, 0.4 * (end - begin));
   fit.half_opening_m = 0.002;
+  bool round = true;
   for (const Extent& extent : extents) {
-    if (extent.begin < fit.grip_end_m) fit.half_opening_m = std::max(fit.half_opening_m, extent.half);
+    if (extent.begin >= fit.grip_end_m) continue;
+    fit.half_opening_m = std::max(fit.half_opening_m, extent.half);
+    round = round && IsRoundGrip(task_model, *data, extent.geom, flange_T_world);
+  }
+  if (round) {
+    // However the tool is turned in it, the gripper sits on the flange in one way.
+    fit.closing_axis = Eigen::Vector3d::UnitX();
+    fit.half_opening_m = 0.002;
+    for (const Extent& extent : extents) {
+      if (extent.begin >= fit.grip_end_m) continue;
+      fit.half_opening_m = std::max(fit.half_opening_m, task_model.geom_size[3 * extent.geom]);
+    }
   }
   return fit;
 }

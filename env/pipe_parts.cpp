@@ -106,15 +106,106 @@ std::string HeldPipe(const PipeParameters& p) {
               text);
 }
 
-std::string FixedElbow(const PipeParameters& p) {
+/// The ring of an arm along +x that ends at (`end_m`, 0, `height_m`): wedges turned by 90 degrees about y.
+std::string SideRing(const PipeParameters& p, const std::string& material, double end_m, double height_m) {
+  const double quarter = std::sqrt(0.5);
+  std::string text;
+  for (int k = 0; k < p.bore_sides; ++k) {
+    const double c = quarter * std::cos(kPi * k / p.bore_sides);
+    const double s = quarter * std::sin(kPi * k / p.bore_sides);
+    text += fmt::format(
+        "  <geom class=\"part\" type=\"mesh\" mesh=\"elbow_wedge\" pos=\"{}\" quat=\"{} {}\" material=\"{}\" "
+        "mass=\"0.01\"/>\n",
+        Vector(end_m, 0, height_m), Number(c), Vector(s, c, s), material);
+  }
+  return text;
+}
+
+/// What an elbow is made of below its mouth, without stand: ring, body, side arm, and for the eye the arm's mouth.
+std::string ElbowBody(const PipeParameters& p) {
   const double radius = 0.5 * p.elbow_diameter_m;
-  const double bottom = -p.socket_to_arm_m - radius;
   std::string text = Ring(p, "elbow_brass", false);
-  text += Cylinder("name=\"elbow_body\" class=\"part\"", Vector(0, 0, -p.bore_depth_m), Vector(0, 0, bottom), radius,
-                   "elbow_brass");
+  text += Cylinder("name=\"elbow_body\" class=\"part\"", Vector(0, 0, -p.bore_depth_m),
+                   Vector(0, 0, -p.socket_to_arm_m - radius), radius, "elbow_brass");
   text += "  <!-- Begins outside the bore. -->\n";
   text += Cylinder("name=\"elbow_arm\" class=\"part\"", Vector(BoreRadius(p) + 0.002, 0, -p.socket_to_arm_m),
                    Vector(p.side_arm_m, 0, -p.socket_to_arm_m), radius, "elbow_brass");
+  return text;
+}
+
+std::string BaseElbow(const PipeParameters& p) {
+  const double radius = 0.5 * p.elbow_diameter_m;
+  const double bottom = -p.socket_to_arm_m - radius;
+  std::string text = ElbowBody(p);
+  text += "  <!-- The foot. -->\n";
+  text += Cylinder("class=\"part\"", Vector(0, 0, bottom), Vector(0, 0, 0.008 - p.base_height_m), 0.018, "pipe_stand");
+  text += Cylinder("class=\"part\"", Vector(0, 0, 0.008 - p.base_height_m), Vector(0, 0, -p.base_height_m), 0.055,
+                   "pipe_stand");
+  text += "  <!-- For the eye: the end of the side arm. -->\n";
+  text += Cylinder("class=\"part_visual\"", Vector(p.side_arm_m - 0.001, 0, -p.socket_to_arm_m),
+                   Vector(p.side_arm_m + 0.0001, 0, -p.socket_to_arm_m), BoreRadius(p), "pipe_inside");
+  return File("base_elbow_geoms",
+              fmt::format("Elbow on a foot, mouth up, {} mm over the table: what a structure begins with.\n       "
+                          "Origin at the centre of the mouth, +z out of it, side arm along +x.",
+                          Number(1000 * p.base_height_m)),
+              text);
+}
+
+std::string BranchPipe(const PipeParameters& p) {
+  const double radius = 0.5 * p.pipe_diameter_m;
+  const double length = p.joint_pipe_m;
+  const double branch = length - p.branch_depth_m;
+  std::string text =
+      Cylinder("name=\"pipe\" class=\"part\" mass=\"0.22\"", "0 0 0", Vector(0, 0, length), radius, "pipe_metal");
+  text += Cylinder("name=\"branch\" class=\"part\" mass=\"0.12\"", Vector(0, 0, branch),
+                   Vector(p.side_arm_m, 0, branch), radius, "pipe_metal");
+  text += "  <!-- For the eye: the bores, and how deep both ends go in. -->\n";
+  text += Cylinder("class=\"part_visual\"", Vector(0, 0, -0.0001), Vector(0, 0, 0.001), radius - 0.003, "pipe_inside");
+  text += Cylinder("class=\"part_visual\"", Vector(0, 0, length - 0.001), Vector(0, 0, length + 0.0001), radius - 0.003,
+                   "pipe_inside");
+  text += Cylinder("class=\"part_visual\"", Vector(p.side_arm_m - 0.001, 0, branch),
+                   Vector(p.side_arm_m + 0.0001, 0, branch), radius - 0.003, "pipe_inside");
+  for (const double z : {p.bore_depth_m - 0.0025, length - p.bore_depth_m + 0.0015}) {
+    text += Cylinder("class=\"part_visual\"", Vector(0, 0, z), Vector(0, 0, z + 0.001), radius + 0.0001, "pipe_mark");
+  }
+  return File("branch_pipe_geoms",
+              fmt::format("Pipe of {} mm across, {} mm long, with a side branch of {} mm along +x by which the turn of "
+                          "its upper\n       end is felt. Origin at the centre of the tip face, +z upwards.",
+                          Number(1000 * p.pipe_diameter_m), Number(1000 * length), Number(1000 * p.side_arm_m)),
+              text);
+}
+
+std::string JointElbow(const PipeParameters& p) {
+  const double radius = 0.5 * p.elbow_diameter_m;
+  const double height = p.held_socket_to_arm_m;
+  const double top = height + radius;
+  const double stub = p.side_arm_m - p.socket_to_arm_m;
+  std::string text = Ring(p, "elbow_brass", true);
+  text += SideRing(p, "elbow_brass", p.side_arm_m, height);
+  text += Cylinder("name=\"elbow_body\" class=\"part\" mass=\"0.12\"", Vector(0, 0, p.bore_depth_m), Vector(0, 0, top),
+                   radius, "elbow_brass");
+  text += Cylinder("name=\"elbow_arm\" class=\"part\" mass=\"0.06\"", Vector(0, 0, height),
+                   Vector(p.side_arm_m - p.bore_depth_m, 0, height), radius, "elbow_brass");
+  text += "  <!-- By which the turn of the second mouth is felt; begins outside its bore. -->\n";
+  text += Cylinder("name=\"elbow_stub\" class=\"part\" mass=\"0.06\"", Vector(stub, BoreRadius(p) + 0.002, height),
+                   Vector(stub, p.side_arm_m, height), radius, "elbow_brass");
+  text += Cylinder("name=\"elbow_handle\" class=\"part\" mass=\"0.03\"", Vector(0, 0, top),
+                   Vector(0, 0, top + p.handle_m), 0.5 * p.pipe_diameter_m, "pipe_metal");
+  text += "  <!-- For the eye: the end of the stub. -->\n";
+  text += Cylinder("class=\"part_visual\"", Vector(stub, p.side_arm_m - 0.001, height),
+                   Vector(stub, p.side_arm_m + 0.0001, height), BoreRadius(p), "pipe_inside");
+  return File("joint_elbow_geoms",
+              fmt::format("Elbow of {} mm across with two mouths, one down, one at the end of the arm of {} mm along "
+                          "+x, a stub along +y\n       and a handle on top. Origin at the centre of the lower mouth, "
+                          "+z into it.",
+                          Number(1000 * p.elbow_diameter_m), Number(1000 * p.side_arm_m)),
+              text);
+}
+
+std::string FixedElbow(const PipeParameters& p) {
+  const double radius = 0.5 * p.elbow_diameter_m;
+  const double bottom = -p.socket_to_arm_m - radius;
+  std::string text = ElbowBody(p);
   text += "  <!-- Closes the bore while the target is localized: in the contact map, not in physics. -->\n";
   text += Cylinder("name=\"lid\" class=\"part_lid\"", Vector(0, 0, -p.lid_recess_m), Vector(0, 0, -p.bore_depth_m),
                    BoreRadius(p) + 0.001, "pipe_lid");
@@ -181,7 +272,7 @@ bool PipeParameters::IsValid(std::string* error) const {
     return false;
   };
   for (const double size : {pipe_diameter_m, elbow_diameter_m, clearance_m, bore_depth_m, side_arm_m, socket_to_arm_m,
-                            held_socket_to_arm_m, held_pipe_m, handle_m, branch_depth_m}) {
+                            held_socket_to_arm_m, held_pipe_m, handle_m, branch_depth_m, joint_pipe_m, base_height_m}) {
     if (!(size > 0.0 && size < 1.0)) return fail(fmt::format("a size of {} m", size));
   }
   if (bore_sides < 6 || bore_sides > 64) return fail(fmt::format("a bore of {} sides", bore_sides));
@@ -196,17 +287,22 @@ bool PipeParameters::IsValid(std::string* error) const {
   if (socket_to_arm_m <= 0.5 * elbow_diameter_m) return fail("the side arm of the elbow rises above its mouth");
   if (held_socket_to_arm_m - 0.5 * elbow_diameter_m < bore_depth_m) return fail("the side arm closes the held bore");
   if (branch_depth_m - 0.5 * pipe_diameter_m < bore_depth_m) return fail("the branch of the post meets the elbow");
+  if (joint_pipe_m - branch_depth_m - 0.5 * pipe_diameter_m < bore_depth_m) {
+    return fail("the branch of the pipe meets the elbow below it");
+  }
+  if (side_arm_m - socket_to_arm_m - 0.5 * elbow_diameter_m < 0.0) return fail("the stub lies within the socket");
+  if (base_height_m < socket_to_arm_m + 0.5 * elbow_diameter_m + 0.008)
+    return fail("the base is too low for its elbow");
   return true;
 }
 
 std::vector<PartFile> GeneratePipeParts(const PipeParameters& parameters) {
   std::string error;
   if (!parameters.IsValid(&error)) throw InputError("pipe parts", error, "see docs/pipes.md for the sizes");
-  return {{"pipe_assets.xml", Assets(parameters)},
-          {"pipe_geoms.xml", HeldPipe(parameters)},
-          {"elbow_geoms.xml", FixedElbow(parameters)},
-          {"elbow_held_geoms.xml", HeldElbow(parameters)},
-          {"pipe_post_geoms.xml", Post(parameters)}};
+  return {{"pipe_assets.xml", Assets(parameters)},           {"pipe_geoms.xml", HeldPipe(parameters)},
+          {"elbow_geoms.xml", FixedElbow(parameters)},       {"elbow_held_geoms.xml", HeldElbow(parameters)},
+          {"pipe_post_geoms.xml", Post(parameters)},         {"base_elbow_geoms.xml", BaseElbow(parameters)},
+          {"branch_pipe_geoms.xml", BranchPipe(parameters)}, {"joint_elbow_geoms.xml", JointElbow(parameters)}};
 }
 
 }  // namespace feeler::env

@@ -18,6 +18,8 @@ struct PipeParameters {
   double held_pipe_m = 0.120;           ///< length of the pipe in the gripper
   double handle_m = 0.030;              ///< stub of the held elbow that the gripper holds
   double branch_depth_m = 0.050;        ///< from the top of a post down to the axis of its side branch
+  double joint_pipe_m = 0.160;          ///< length of the pipe with a branch that structures are built of
+  double base_height_m = 0.120;         ///< of the mouth of the base elbow over its foot
   /// How far below the rim the lid lies. A pipe of other tilt than the socket dips into the mouth before it touches the
   /// rim; with the lid below that, policies are planned on what will be felt.
   double lid_recess_m = 0.004;
@@ -35,8 +37,11 @@ struct PartFile {
 
 /// The part files of pipes and elbows: `pipe_assets.xml` (meshes and materials), `pipe_geoms.xml` (a pipe as tool),
 /// `elbow_geoms.xml` (an elbow as target), `elbow_held_geoms.xml` (an elbow as tool, mouth down), `pipe_post_geoms.xml`
-/// (an upright pipe with a side branch as target). Origins at tip or mouth, the side arms along +x. A bore is a ring
-/// of convex wedges. Throws InputError if the parameters are not valid.
+/// (an upright pipe with a side branch as target). And what structures are built of (docs/assembly.md):
+/// `base_elbow_geoms.xml` (an elbow on a foot), `branch_pipe_geoms.xml` (a pipe with a branch), `joint_elbow_geoms.xml`
+/// (an elbow whose arm ends in a second mouth), with the contact geometry of the former at every end and mouth. Origins
+/// at tip or mouth, the side arms along +x. A bore is a ring of convex wedges. Throws InputError if the parameters are
+/// not valid.
 std::vector<PartFile> GeneratePipeParts(const PipeParameters& parameters);
 
 }  // namespace feeler::env

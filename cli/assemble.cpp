@@ -1,0 +1,210 @@
+// feeler assemble: structures, as sequences of insertions.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/solver_flags.h"
+#include "core/error.h"
+#include "evaluation/statistics.h"
+#include "workflow/assembly_builds.h"
+#include "workflow/assembly_video.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string assembly;
+  std::vector<std::string> databases;
+  std::int64_t seed = 1;
+  std::int64_t builds = 1;
+  int jobs = 1;
+  std::string out;
+  std::string video;
+  double video_speed = 4.0;
+  std::string render;
+  bool check = false;
+  bool no_ladder = false;
+  bool json = false;
+};
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string joined;
+  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
+  return joined;
+}
+
+void RequireSane(const Flags& flags) {
+  if (flags.builds < 1) throw InputError("--builds", fmt::format("{}", flags.builds), "give 1 or more");
+  if (!(flags.video_speed >= 0.25 && flags.video_speed <= 50.0)) {
+    throw InputError("--video-speed", fmt::format("{} is out of range", flags.video_speed), "0.25 to 50");
+  }
+  if (!flags.video.empty() && flags.builds > 1) {
+    throw InputError("--video", "shows one build", "leave out --builds");
+  }
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  if (!flags.video.empty()) RequireWritable("--video", flags.video);
+  if (!flags.render.empty()) RequireWritable("--render", flags.render);
+  if (!flags.check && flags.render.empty() && flags.databases.empty()) {
+    throw InputError("--db", "missing", "give the database of each task (feeler preprocess), or --check");
+  }
+}
+
+/// The structure as drawn.
+void PrintDrawing(const workflow::Assembly& assembly, const workflow::AssemblyPlan& plan, bool json) {
+  nlohmann::ordered_json steps = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < assembly.insertions.size(); ++i) {
+    const workflow::AssemblyInsertion& step = assembly.insertions[i];
+    const Pose& part = plan.world_T_part[static_cast<std::size_t>(step.part)];
+    const Pose target = workflow::TargetPoseOf(assembly, step, plan.world_T_part[static_cast<std::size_t>(step.into)]);
+    const Eigen::Vector3d way = target.linear() * UnitVector(assembly.TaskOf(step).insertion);
+    const Eigen::Vector3d p = part.translation();
+    if (!json) {
+      fmt::print("{:>3}  {:<10} into {:<16} {:<18} along {:+.2f} {:+.2f} {:+.2f}, ends at {:.3f} {:.3f} {:.3f} m\n", i,
+                 assembly.Part(step.part).name, assembly.Part(step.into).name + "." + assembly.PortOf(step).name,
+                 step.task, way.x(), way.y(), way.z(), p.x(), p.y(), p.z());
+    }
+    steps.push_back({{"part", assembly.Part(step.part).name},
+                     {"into", assembly.Part(step.into).name},
+                     {"port", assembly.PortOf(step).name},
+                     {"task", step.task},
+                     {"direction", {way.x(), way.y(), way.z()}},
+                     {"part_position_m", {p.x(), p.y(), p.z()}}});
+  }
+  if (json) {
+    PrintJson({{"assembly", assembly.name}, {"sound", true}, {"insertions", steps}});
+  } else {
+    fmt::print("{}: {} insertions, sound\n", assembly.name, assembly.insertions.size());
+  }
+}
+
+nlohmann::json RateJson(const evaluation::Rate& rate) {
+  return {{"successes", rate.successes},
+          {"trials", rate.trials},
+          {"value", rate.value},
+          {"low", rate.low},
+          {"high", rate.high}};
+}
+
+void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
+                  const std::vector<workflow::AssemblyRecord>& records) {
+  const workflow::AssemblySummary summary = workflow::Summarize(records);
+  const evaluation::Rate complete = evaluation::WilsonRate(summary.complete, summary.builds);
+  const evaluation::Rate inserted = evaluation::WilsonRate(summary.inserted, summary.insertions);
+  const double sim_time_s = evaluation::Median(summary.complete_sim_time_s);
+  if (flags.json) {
+    nlohmann::json json = {
+        {"assembly", assembly.name},
+        {"seed", flags.seed},
+        {"builds", summary.builds},
+        {"complete", RateJson(complete)},
+        {"insertions", RateJson(inserted)},
+        {"first_attempt", summary.first_attempt},
+        {"ladder_used", summary.ladder_used},
+        {"policies", summary.policies},
+        {"largest_off_drawing", {{"lateral_m", summary.largest_lateral_m}, {"angle_rad", summary.largest_angle_rad}}},
+        {"sim_time_s", {{"complete_median", sim_time_s}}},
+        {"stops", nlohmann::json::array()}};
+    for (const workflow::AssemblyRecord& record : records) {
+      if (!record.complete) json["stops"].push_back({{"seed", record.seed}, {"reason", record.reason}});
+    }
+    PrintJson(json);
+    return;
+  }
+  fmt::print(
+      "{}: {} of {} builds complete ({:.1f} % to {:.1f} %), {} of {} insertions, {} at the first attempt, {} with "
+      "a fallback; {:.0f} s a build (median)\n",
+      assembly.name, summary.complete, summary.builds, 100 * complete.low, 100 * complete.high, summary.inserted,
+      summary.insertions, summary.first_attempt, summary.ladder_used, sim_time_s);
+  fmt::print("ports off the drawing by up to {:.2f} mm and {:.4f} rad; policies:", 1e3 * summary.largest_lateral_m,
+             summary.largest_angle_rad);
+  for (const auto& [source, count] : summary.policies) fmt::print(" {} {},", count, source);
+  fmt::print("\n");
+  for (const workflow::AssemblyRecord& record : records) {
+    if (!record.complete) fmt::print("seed {}: {}\n", record.seed, record.reason);
+  }
+}
+
+void Run(const Flags& flags, Session& session) {
+  RequireSane(flags);
+  const Parallelism jobs = ParseJobs(flags.jobs);
+  const std::uint64_t seed = ParseSeed(flags.seed);
+  const workflow::Assembly assembly = workflow::LoadAssembly(flags.assembly);
+  ProgressBar check_bar("checking");
+  const workflow::AssemblyPlan plan = workflow::CheckAssembly(assembly, check_bar.Callback());
+  check_bar.Finish();
+  if (!flags.render.empty()) env::WritePng(workflow::RenderAssembly(assembly, plan), flags.render);
+  if (flags.check || (flags.databases.empty() && !flags.render.empty())) {
+    PrintDrawing(assembly, plan, flags.json);
+    return;
+  }
+  ProgressBar map_bar("contact map");
+  const workflow::AssemblyTasks tasks =
+      workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, map_bar.Callback());
+  map_bar.Finish();
+
+  std::ofstream out;
+  if (!flags.out.empty()) {
+    out.open(flags.out);
+    if (!out) throw InputError("--out", "cannot write " + flags.out, "choose another file");
+  }
+  workflow::AssemblyFilm film;
+  film.period_s = flags.video_speed / 25.0;
+  workflow::AssemblyOptions options;
+  options.seed = seed;
+  options.ladder = !flags.no_ladder;
+  options.cancellation = session.cancellation;
+  if (!flags.video.empty()) options.film = &film;
+  ProgressBar bar("insertions");
+  std::vector<workflow::AssemblyRecord> records;
+  const auto on_record = [&](const workflow::AssemblyRecord& record) {
+    records.push_back(record);
+    for (const auto& line : workflow::ToJsonLines(assembly, record)) {
+      if (out.is_open()) out << line.dump() << "\n";
+    }
+    out.flush();
+  };
+  workflow::BuildAssemblies(assembly, plan, tasks, options, static_cast<int>(flags.builds), jobs, on_record,
+                            bar.Callback());
+  bar.Finish();
+  if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
+  if (!flags.video.empty() && !records.empty()) {
+    ProgressBar video_bar("video frames");
+    workflow::WriteAssemblyVideo(assembly, film, records.front(), flags.video, video_bar.Callback());
+  }
+  PrintSummary(flags, assembly, records);
+  const bool one_stopped = flags.builds == 1 && !records.empty() && !records.front().complete;
+  if (one_stopped || session.cancellation->cancelled()) session.exit_code = 1;
+}
+
+}  // namespace
+
+void AddAssembleCommand(CLI::App& app, Session& session) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand("assemble", "Builds a structure in simulation, insertion by insertion");
+  command
+      ->add_option("--assembly", flags->assembly,
+                   "name under models/assemblies/ (" + Joined(workflow::ListAssemblies()) + "), or path of a file")
+      ->required();
+  command->add_option("--db", flags->databases, "policy database of a task (feeler preprocess); once for each task");
+  command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
+  command->add_option("--builds", flags->builds, "how many, with the seeds from --seed on")->capture_default_str();
+  command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();
+  command->add_option("--out", flags->out, "records, one JSON object a line: each insertion, then the verdict");
+  command->add_option("--video", flags->video, "MP4 of the build");
+  command->add_option("--video-speed", flags->video_speed, "how many times as fast as the robot")
+      ->capture_default_str();
+  command->add_option("--render", flags->render, "PNG of the structure as drawn");
+  command->add_flag("--check", flags->check, "check the assembly and print what is drawn; builds nothing");
+  command->add_flag("--no-ladder", flags->no_ladder, "no fallbacks, and no second attempt");
+  command->add_flag("--json", flags->json, "print the summary as JSON");
+  command->callback([flags, &session] { Run(*flags, session); });
+}
+
+}  // namespace feeler::cli

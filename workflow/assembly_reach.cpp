@@ -1,0 +1,165 @@
+#include "workflow/assembly_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "env/control/tool_kinematics.h"
+#include "env/insertion_env.h"
+
+namespace feeler::workflow {
+namespace {
+
+/// How far any joint may turn between the start pose and the places around it; a branch that has to turn farther is
+/// near a singularity, where straight motions crawl.
+constexpr double kMostJointTurn_rad = 0.9;
+/// A hair short of the end, where a part may stand on a floor.
+constexpr double kShort_m = 5e-4;
+constexpr int kFarIterations = 20000;
+
+std::optional<env::JointVector> Follow(const env::Scene& scene, const env::JointVector& from_rad, const Pose& goal) {
+  env::JointVector q = from_rad;
+  if (!env::SolveNearby(scene, goal, q, kMostJointTurn_rad)) return std::nullopt;
+  return q;
+}
+
+planner::JointBounds JointLimits(const env::Scene& scene) {
+  planner::JointBounds limits{env::JointVector::Zero(), env::JointVector::Zero()};
+  for (int i = 0; i < env::kJointCount; ++i) {
+    const double* range = scene.model->jnt_range + 2 * scene.joint[static_cast<std::size_t>(i)];
+    limits.lower_rad[i] = range[0];
+    limits.upper_rad[i] = range[1];
+  }
+  return limits;
+}
+
+/// The same place of all links, each joint as near to `start` as whole turns and the bounds allow.
+Eigen::VectorXd NearestTwin(const env::JointVector& q, const env::JointVector& start,
+                            const planner::JointBounds& bounds) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  Eigen::VectorXd twin = q;
+  for (int i = 0; i < env::kJointCount; ++i) {
+    for (const double other : {q[i] - kTurn, q[i] + kTurn}) {
+      const bool allowed = other >= bounds.lower_rad[i] && other <= bounds.upper_rad[i];
+      if (allowed && std::abs(other - start[i]) < std::abs(twin[i] - start[i])) twin[i] = other;
+    }
+  }
+  return twin;
+}
+
+}  // namespace
+
+StageReach::StageReach(std::shared_ptr<const env::Scene> scene)
+    : scene_(std::move(scene)), roomy_(*scene_), exact_(*scene_, 0.0) {}
+
+std::string StageReach::Approaches(const env::JointVector& q_rad, const Pose& world_T_grasp) {
+  if (!roomy_.Free(q_rad)) return roomy_.Collision(q_rad);
+  const Eigen::Vector3d outward = -UnitVector(scene_->task.insertion);
+  env::JointVector q = q_rad;
+  for (const double way_m : {0.5 * kApproach_m, 0.0}) {
+    const auto next = Follow(*scene_, q, world_T_grasp * Eigen::Translation3d(way_m * outward));
+    if (!next) return "the straight way to it is out of reach";
+    q = *next;
+    if (!exact_.Free(q)) return exact_.Collision(q);
+  }
+  return "";
+}
+
+ServingBranches StageReach::AtApproach(const Pose& world_T_grasp) {
+  roomy_.SetTargetPoses({scene_->task.world_T_target});
+  exact_.SetTargetPoses({scene_->task.world_T_target});
+  const Eigen::Vector3d outward = -UnitVector(scene_->task.insertion);
+  ServingBranches serving;
+  serving.obstacle = "out of reach";
+  for (const env::JointVector& q :
+       env::ToolInverseKinematics(*scene_, world_T_grasp * Eigen::Translation3d(kApproach_m * outward))) {
+    const std::string obstacle = Approaches(q, world_T_grasp);
+    if (obstacle.empty()) {
+      serving.q_rad.push_back(q);
+    } else {
+      serving.obstacle = obstacle;
+    }
+  }
+  if (!serving.q_rad.empty()) serving.obstacle.clear();
+  return serving;
+}
+
+std::string StageReach::Starts(const env::JointVector& q_rad, const Pose& world_T_target) {
+  if (!roomy_.Free(q_rad)) return roomy_.Collision(q_rad) + " at the start pose";
+  const Task& task = scene_->task;
+  const auto at = [&](const Eigen::Vector3d& place) {
+    return Follow(*scene_, q_rad, world_T_target * Eigen::Translation3d(place));
+  };
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  const auto inserted = at((task.insertion_depth_m - kShort_m) * inward);
+  if (!inserted) return "the end of the insertion is out of reach";
+  if (!exact_.Free(*inserted)) return exact_.Collision(*inserted) + " at the end of the insertion";
+  const int along = AxisOf(task.insertion);
+  const int u = (along + 1) % 3;
+  const int v = (along + 2) % 3;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d place = task.start_offset_m;
+    place[u] += task.workspace_center_m[u] + ((corner & 1) != 0 ? task.workspace_m[u] : -task.workspace_m[u]);
+    place[v] += task.workspace_center_m[v] + ((corner & 2) != 0 ? task.workspace_m[v] : -task.workspace_m[v]);
+    // Down there the part itself may meet the target, so the arm is asked about half way to the mouth.
+    if ((corner & 4) != 0) place[along] *= 0.5;
+    const auto q = at(place);
+    if (!q) return "a corner of the workspace of the task is out of reach";
+    if (!exact_.Free(*q)) return exact_.Collision(*q) + " at a corner of the workspace of the task";
+  }
+  const auto away = Follow(*scene_, *inserted,
+                           world_T_target * Eigen::Translation3d((task.insertion_depth_m - kApproach_m) * inward));
+  if (!away) return "the way of the empty gripper off the part is out of reach";
+  if (!exact_.Free(*away)) return exact_.Collision(*away) + " on the way off the part";
+  return "";
+}
+
+ServingBranches StageReach::AtStart(const Pose& world_T_target) {
+  roomy_.SetTargetPoses({world_T_target});
+  exact_.SetTargetPoses({world_T_target});
+  ServingBranches serving;
+  serving.obstacle = "out of reach";
+  for (const env::JointVector& q : env::ToolInverseKinematics(*scene_, env::StartPose(scene_->task, world_T_target))) {
+    const std::string obstacle = Starts(q, world_T_target);
+    if (obstacle.empty()) {
+      serving.q_rad.push_back(q);
+    } else {
+      serving.obstacle = obstacle;
+    }
+  }
+  if (!serving.q_rad.empty()) serving.obstacle.clear();
+  return serving;
+}
+
+planner::TransferPlan PlanToBranches(env::TransferChecker& checker, const env::Scene& scene,
+                                     const env::JointVector& start_rad, const std::vector<env::JointVector>& branches,
+                                     std::uint64_t seed) {
+  planner::TransferOptions options;
+  options.seed = seed;
+  options.reach_m = checker.reach_m();
+  // As env::PlanTransfer: half the spacing stays within the clearance, and so does half of it again.
+  options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
+  const planner::ValidityFunction free = [&](const Eigen::VectorXd& q) { return checker.Free(q); };
+  const planner::JointBounds limits = JointLimits(scene);
+  planner::JointBounds near;
+  const env::JointVector half = env::JointVector::Constant(std::numbers::pi);
+  near.lower_rad = env::JointVector(-half).cwiseMin(start_rad).cwiseMax(limits.lower_rad);
+  near.upper_rad = half.cwiseMax(start_rad).cwiseMin(limits.upper_rad);
+  std::vector<Eigen::VectorXd> goals(branches.begin(), branches.end());
+  for (const env::JointVector& q : branches) {
+    Eigen::VectorXd twin = NearestTwin(q, start_rad, near);
+    if (twin != goals[static_cast<std::size_t>(&q - branches.data())]) goals.push_back(std::move(twin));
+  }
+  planner::TransferPlan plan = planner::TransferPlanner(near, free, options).Plan(start_rad, goals);
+  if (plan.status == planner::TransferStatus::kNotFound) {
+    for (const env::JointVector& q : branches) goals.push_back(NearestTwin(q, start_rad, limits));
+    options.iterations_all_goals = kFarIterations;
+    plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
+  }
+  if (plan.status == planner::TransferStatus::kStartInvalid) plan.reason += ": " + checker.Collision(start_rad);
+  return plan;
+}
+
+}  // namespace feeler::workflow
