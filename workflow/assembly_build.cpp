@@ -289,8 +289,8 @@ class Builder {
       if (!axis.angular()) half_m[static_cast<int>(axis.kind)] = 0.5 * attempt.extents[axis.kind] * axis.resolution;
     }
     step.reason = attempt.reason = "not begun";
-    stage.Transfer(execution::StartPose(task, problem, attempt.world_T_estimate),
-                   stage.reach().AtStart(attempt.world_T_estimate),
+    const Pose start = execution::StartPose(task, problem, attempt.world_T_estimate);
+    stage.Transfer(start, stage.reach().AtStart(attempt.world_T_estimate, start),
                    env::TargetCandidates(attempt.world_T_estimate, half_m), "carrying the part");
 
     execution::ExecutorOptions options;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "env/insertion_env.h"
 #include "workflow/assembly_mating.h"
 #include "workflow/assembly_reach.h"
 #include "workflow/assembly_stage.h"
@@ -115,7 +116,7 @@ class Checker {
     const ServingBranches off = insert.AtApproach(grasp);
     if (!off.obstacle.empty()) return "lifting: " + off.obstacle;
     for (const Pose& target : Turned(*assembly_.tasks.at(step.task), scene->task.world_T_target)) {
-      const ServingBranches start = insert.AtStart(target);
+      const ServingBranches start = insert.AtStart(target, env::StartPose(scene->task, target));
       if (!start.obstacle.empty()) return "inserting: " + start.obstacle;
     }
     return "";

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "env/control/tool_kinematics.h"
-#include "env/insertion_env.h"
 
 namespace feeler::workflow {
 namespace {
@@ -116,12 +115,12 @@ std::string StageReach::Starts(const env::JointVector& q_rad, const Pose& world_
   return "";
 }
 
-ServingBranches StageReach::AtStart(const Pose& world_T_target) {
+ServingBranches StageReach::AtStart(const Pose& world_T_target, const Pose& world_T_start) {
   roomy_.SetTargetPoses({world_T_target});
   exact_.SetTargetPoses({world_T_target});
   ServingBranches serving;
   serving.obstacle = "out of reach";
-  for (const env::JointVector& q : env::ToolInverseKinematics(*scene_, env::StartPose(scene_->task, world_T_target))) {
+  for (const env::JointVector& q : env::ToolInverseKinematics(*scene_, world_T_start)) {
     const std::string obstacle = Starts(q, world_T_target);
     if (obstacle.empty()) {
       serving.q_rad.push_back(q);

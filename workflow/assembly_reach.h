@@ -29,9 +29,10 @@ class StageReach {
   /// kFetch for the empty gripper; that of kInsert for the part in it, coming out of where it lies.
   ServingBranches AtApproach(const Pose& world_T_grasp);
 
-  /// At the start pose over a target that is believed at `world_T_target`: from there to the corners of the workspace
-  /// of the task, to the end of the insertion and, with the part left there, away; all of it free. Scene of kInsert.
-  ServingBranches AtStart(const Pose& world_T_target);
+  /// With the tool at `world_T_start` over a target that is believed at `world_T_target`: from there to the corners of
+  /// the workspace of the task, to the end of the insertion and, with the part left there, away; all of it free. Scene
+  /// of kInsert.
+  ServingBranches AtStart(const Pose& world_T_target, const Pose& world_T_start);
 
   env::TransferChecker& transfers() { return roomy_; }
 

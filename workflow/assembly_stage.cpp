@@ -97,7 +97,9 @@ env::Scene BuildStage(const Assembly& assembly, const StageLayout& layout) {
   }
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
-  return env::BuildScene(task, printer.CStr(), env::ModelsFolder().string());
+  env::SceneOptions options;
+  options.cameras.housings = false;
+  return env::BuildScene(task, printer.CStr(), env::ModelsFolder().string(), options);
 }
 
 }  // namespace feeler::workflow
