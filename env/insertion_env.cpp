@@ -31,37 +31,16 @@ void RequireWithin(const Eigen::Vector3d& v, double limit, const char* where, co
   }
 }
 
-// Of the box in which the target may stand, along the axes of the estimate.
-Eigen::Vector3d HalfExtents(const Task& task, const std::vector<int>& extents) {
-  Eigen::Vector3d half_m = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < extents.size(); ++i) {
-    const UncertainAxis& axis = task.axes[i];
-    if (!axis.angular()) half_m[static_cast<int>(axis.kind)] = extents[i] * axis.resolution / 2;
-  }
-  return half_m;
-}
-
-bool Touches(const mjData& data) {
-  return std::any_of(data.contact, data.contact + data.ncon, [](const mjContact& c) { return c.efc_address >= 0; });
-}
-
-}  // namespace
-
-Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents,
-                  RandomStream& random) {
-  if (extents.size() != task.axes.size()) {
-    throw InputError("extents",
-                     fmt::format("{} given, the task has {} uncertain axes", extents.size(), task.axes.size()),
-                     "give one per axis");
-  }
+/// The place in the box of hypotheses at these fractions of its size, -0.5 to 0.5 along each axis of the task.
+Pose PlaceInBox(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents,
+                const std::vector<double>& fractions) {
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
   double yaw_rad = 0.0;
   double pitch_rad = 0.0;
   for (std::size_t i = 0; i < extents.size(); ++i) {
     const UncertainAxis& axis = task.axes[i];
-    if (extents[i] < 1) throw InputError("extents", fmt::format("{} is not an extent", extents[i]), "give 1 or more");
     const double cells = axis.angular() ? extents[i] - 1 : extents[i];
-    const double value = axis.resolution * cells * random.Uniform(-0.5, 0.5);
+    const double value = axis.resolution * cells * fractions[i];
     switch (axis.kind) {
       case AxisKind::kX: offset_m.x() = value; break;
       case AxisKind::kY: offset_m.y() = value; break;
@@ -79,10 +58,46 @@ Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vec
   const Eigen::Matrix3d turn = (Eigen::AngleAxisd(center_yaw_rad + yaw_rad, Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(center_pitch_rad + pitch_rad, Eigen::Vector3d::UnitY()))
                                    .toRotationMatrix();
-  Pose truth = world_T_estimate;
-  truth.translation() += world_R_frame * offset_m;
-  truth.linear() = world_R_frame * turn;
-  return truth;
+  Pose place = world_T_estimate;
+  place.translation() += world_R_frame * offset_m;
+  place.linear() = world_R_frame * turn;
+  return place;
+}
+
+bool Touches(const mjData& data) {
+  return std::any_of(data.contact, data.contact + data.ncon, [](const mjContact& c) { return c.efc_address >= 0; });
+}
+
+}  // namespace
+
+Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents,
+                  RandomStream& random) {
+  if (extents.size() != task.axes.size()) {
+    throw InputError("extents",
+                     fmt::format("{} given, the task has {} uncertain axes", extents.size(), task.axes.size()),
+                     "give one per axis");
+  }
+  std::vector<double> fractions;
+  for (const int extent : extents) {
+    if (extent < 1) throw InputError("extents", fmt::format("{} is not an extent", extent), "give 1 or more");
+    fractions.push_back(random.Uniform(-0.5, 0.5));
+  }
+  return PlaceInBox(task, world_T_estimate, extents, fractions);
+}
+
+std::vector<Pose> TargetCandidates(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents) {
+  std::vector<Pose> candidates{world_T_estimate};
+  for (unsigned corner = 0; corner < 1U << extents.size(); ++corner) {
+    std::vector<double> fractions;
+    bool twin = false;  // of a corner on the other side of an axis that has but one place
+    for (std::size_t i = 0; i < extents.size(); ++i) {
+      const bool upper = (corner >> i & 1U) != 0;
+      twin = twin || (upper && task.axes[i].angular() && extents[i] == 1);
+      fractions.push_back(upper ? 0.5 : -0.5);
+    }
+    if (!twin) candidates.push_back(PlaceInBox(task, world_T_estimate, extents, fractions));
+  }
+  return candidates;
 }
 
 Pose StartPose(const Task& task, const Pose& world_T_estimate) {
@@ -148,7 +163,7 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const EpisodeOptions& options
   NoiseOptions noise = options.noise;
   noise.force_offset_n += variation_.force_bias_n;
   PlaceRobot(truth, options, noise, RandomStream(seed, options.episode, "sensor"));
-  robot_.SetTargetCandidates(options.hypotheses.empty() ? TargetCandidates(estimate_, HalfExtents(task(), extents))
+  robot_.SetTargetCandidates(options.hypotheses.empty() ? TargetCandidates(task(), estimate_, extents)
                                                         : options.hypotheses);
   robot_.SetDeadline(limits_.time_s);
   running_ = true;

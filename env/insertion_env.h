@@ -129,6 +129,9 @@ struct EnvState {
 Pose DrawTruePose(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents,
                   RandomStream& random);
 
+/// The centre and the corners of that box: what transfers keep clear of (TransferChecker::SetTargetPoses).
+std::vector<Pose> TargetCandidates(const Task& task, const Pose& world_T_estimate, const std::vector<int>& extents);
+
 /// Where the tool begins: the start offset from the estimate, axes aligned.
 Pose StartPose(const Task& task, const Pose& world_T_estimate);
 

@@ -20,6 +20,9 @@ constexpr int kMostDraws = 100000;
 /// near a singularity, where guarded moves crawl.
 constexpr double kMostJointTurn_rad = 0.8;
 
+/// Where a target is put that is to be left out of a check.
+constexpr double kOutOfTheWay_m = 10.0;
+
 /// Of two geoms of the model, placed as in `data`.
 bool Overlap(const mjModel& model, mjData& data, int first, int second) {
   if (model.geom_type[first] > model.geom_type[second]) std::swap(first, second);
@@ -75,7 +78,10 @@ std::string PlacementSampler::Obstacle(const Pose& world_T_target) {
       env::ToolInverseKinematics(*scene_, env::StartPose(scene_->task, world_T_target));
   if (branches.empty()) return "the start pose is out of reach";
   if (!TargetIsFree(world_T_target)) return "the target overlaps a fixture";
-  roomy_.SetTargetPoses({world_T_target});
+  // As transfers see it: the target stands anywhere in the largest box.
+  std::vector<int> largest;
+  for (const UncertainAxis& axis : scene_->task.axes) largest.push_back(axis.max_cells);
+  roomy_.SetTargetPoses(env::TargetCandidates(scene_->task, world_T_target, largest));
   exact_.SetTargetPoses({world_T_target});
   if (!roomy_.Free(scene_->home_q_rad)) return "the target overlaps the arm at home";
   // A transfer may end in any branch that is free.
@@ -121,7 +127,18 @@ bool PlacementSampler::BranchServes(const env::JointVector& start_rad, const Pos
     const auto q = reach(place);
     if (!q || !exact_.Free(*q)) return false;
   }
-  return true;
+  // Touches go as deep as the inserted tool: beside the target they must not meet the bench, which no policy knows.
+  exact_.SetTargetPoses({Eigen::Translation3d(0.0, 0.0, kOutOfTheWay_m) * world_T_target});
+  bool clear = true;
+  for (int corner = 0; corner < 4 && clear; ++corner) {
+    Eigen::Vector3d place = task.insertion_depth_m * UnitVector(task.insertion);
+    place[u] += (corner & 1) != 0 ? task.workspace_m[u] : -task.workspace_m[u];
+    place[v] += (corner & 2) != 0 ? task.workspace_m[v] : -task.workspace_m[v];
+    const auto q = reach(place);
+    clear = q && exact_.Free(*q);
+  }
+  exact_.SetTargetPoses({world_T_target});
+  return clear;
 }
 
 }  // namespace feeler::workflow

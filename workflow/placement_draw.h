@@ -37,10 +37,11 @@ struct PlacementDraw {
   int rejected = 0;  ///< draws that the robot cannot serve, before the one returned
 };
 
-/// Draws poses of the target, uniform in the part of a workspace that the robot can serve: the target overlaps neither
-/// fixtures nor the arm at home, and every branch of the inverse kinematics that stands free at the start pose (there
-/// is one) moves from there to the corners of the tool's workspace, and stands free at the inserted pose. Not
-/// thread-safe (it holds collision checkers): one per thread.
+/// Draws poses of the target, uniform in the part of a workspace that the robot can serve: the target overlaps no
+/// fixture and, wherever it stands in the task's largest box of hypotheses, not the arm at home, and every branch of
+/// the inverse kinematics that stands free at the start pose (there is one) moves from there to the corners of the
+/// tool's workspace, stands free at the inserted pose, and as deep beside the target meets no fixture. Not thread-safe
+/// (it holds collision checkers): one per thread.
 class PlacementSampler {
  public:
   explicit PlacementSampler(std::shared_ptr<const env::Scene> scene, const Workspace& workspace = {});

@@ -260,6 +260,31 @@ TEST_F(InsertionEnvTest, TrueposesFillTheBoxAndNoMore) {
   EXPECT_NEAR(widest, 0.1, 0.002);  // half the lattice span of five angles
 }
 
+TEST(TargetCandidatesTest, AreTheCentreAndTheCornersOfTheBox) {
+  const Task task = LoadTask("plug").task;
+  const Pose estimate = MakePose(Eigen::Vector3d(0.4, 0.1, 0.2), 0.3);
+  const std::vector<Pose> plug = TargetCandidates(task, estimate, {3, 7, 15});
+  ASSERT_EQ(plug.size(), 9U);
+  EXPECT_EQ(plug.front().matrix(), estimate.matrix());
+  for (std::size_t i = 1; i < plug.size(); ++i) {
+    const Eigen::Vector3d offset_m = (estimate.inverse() * plug[i]).translation();
+    EXPECT_LT((offset_m.cwiseAbs() - Eigen::Vector3d(0.003, 0.007, 0.015)).norm(), 1e-12);
+  }
+  // Turned targets reach farther than shifted ones: a point on each candidate's side arm bounds that of every truth.
+  const Task pipe = LoadTask("pipe-into-elbow").task;
+  const std::vector<Pose> pipes = TargetCandidates(pipe, estimate, {10, 10, 6, 6});
+  EXPECT_EQ(pipes.size(), 17U);
+  EXPECT_EQ(TargetCandidates(pipe, estimate, {10, 10, 1, 6}).size(), 9U);
+  const Eigen::Vector3d arm(0.1, 0.0, 0.0);
+  Eigen::AlignedBox3d hull;
+  for (const Pose& candidate : pipes) hull.extend(estimate.inverse() * candidate * arm);
+  RandomStream random(3, 0, "candidates");
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d end = estimate.inverse() * DrawTruePose(pipe, estimate, {10, 10, 6, 6}, random) * arm;
+    EXPECT_LT(hull.exteriorDistance(end), 1e-3) << "the arc between two corners bulges by less";
+  }
+}
+
 TEST_F(InsertionEnvTest, EpisodesCanBeginAtHome) {
   EpisodeOptions options = Known();
   options.start = StartPlace::kHome;

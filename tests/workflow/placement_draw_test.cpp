@@ -1,7 +1,8 @@
 // Laws: a place is a pure function of the stream; it lies in the workspace, upright, turned within the limits; the
 // robot can serve it (oracle: inverse kinematics and collision checks of the start and the inserted pose); the same
 // draw through a rejecting `accept` comes later and counts the rejections; what lies in the bench, out of reach or on
-// the arm is refused with a reason.
+// the arm, or so low that the tool beside it would meet the bench, is refused with a reason; wherever the target stands
+// in its box of hypotheses, the arm at home is free.
 #include "workflow/placement_draw.h"
 
 #include <gtest/gtest.h>
@@ -44,6 +45,18 @@ TEST(Placement, DrawsWhatTheRobotCanServe) {
   }
 }
 
+TEST(Placement, LeavesTheArmAtHomeFreeWhereverTheTargetIs) {
+  const auto scene = std::make_shared<const env::Scene>(env::BuildScene(env::LoadTask("pipe-into-elbow")));
+  PlacementSampler sampler(scene);
+  env::TransferChecker checker(*scene, 0.0);
+  for (std::uint64_t episode = 0; episode < 12; ++episode) {
+    RandomStream random(8, episode, "placement");
+    const Pose estimate = sampler.Draw(random).world_T_target;
+    checker.SetTargetPoses({env::DrawTruePose(scene->task, estimate, {10, 10, 6, 6}, random)});
+    EXPECT_EQ(checker.Collision(scene->home_q_rad), "") << episode;
+  }
+}
+
 TEST(Placement, RejectionsAreCounted) {
   PlacementSampler sampler(PlugScene());
   RandomStream plain(4, 0, "placement");
@@ -62,6 +75,11 @@ TEST(Placement, RefusesWithAReason) {
   EXPECT_EQ(sampler.Obstacle(PlugScene()->task.world_T_target), "");
   EXPECT_NE(sampler.Obstacle(MakePose(Eigen::Vector3d(2.0, 0.0, 0.2))), "");
   EXPECT_NE(sampler.Obstacle(MakePose(Eigen::Vector3d(0.6, 0.0, 0.02))), "");
+  // So low that the tool beside it would meet the bench.
+  const auto pipes = std::make_shared<const env::Scene>(env::BuildScene(env::LoadTask("pipe-into-elbow")));
+  PlacementSampler of_pipes(pipes);
+  EXPECT_EQ(of_pipes.Obstacle(MakePose(Eigen::Vector3d(0.07, 0.65, 0.15))), "");
+  EXPECT_NE(of_pipes.Obstacle(MakePose(Eigen::Vector3d(0.07, 0.65, 0.01))), "");
   EXPECT_THROW(ParsePlacement("anywhere"), InputError);
   EXPECT_EQ(ParsePlacement("workspace"), Placement::kWorkspace);
 }
