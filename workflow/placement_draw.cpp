@@ -54,6 +54,7 @@ PlacementSampler::PlacementSampler(std::shared_ptr<const env::Scene> scene, cons
     throw InputError("workspace", "its lower bounds lie above the upper", "swap them");
   }
   env::ResetScene(*scene_, scene_->home_q_rad, *data_);
+  for (const UncertainAxis& axis : scene_->task.axes) largest_.push_back(axis.max_cells);
 }
 
 PlacementDraw PlacementSampler::Draw(RandomStream& random, const std::function<bool(const Pose&)>& accept) {
@@ -79,10 +80,7 @@ std::string PlacementSampler::Obstacle(const Pose& world_T_target) {
   if (branches.empty()) return "the start pose is out of reach";
   if (!TargetIsFree(world_T_target)) return "the target overlaps a fixture";
   // As transfers see it: the target stands anywhere in the largest box.
-  std::vector<int> largest;
-  for (const UncertainAxis& axis : scene_->task.axes) largest.push_back(axis.max_cells);
-  roomy_.SetTargetPoses(env::TargetCandidates(scene_->task, world_T_target, largest));
-  exact_.SetTargetPoses({world_T_target});
+  roomy_.SetTargetPoses(env::TargetCandidates(scene_->task, world_T_target, largest_));
   if (!roomy_.Free(scene_->home_q_rad)) return "the target overlaps the arm at home";
   // A transfer may end in any branch that is free.
   bool any = false;
@@ -113,8 +111,13 @@ bool PlacementSampler::BranchServes(const env::JointVector& start_rad, const Pos
   };
   // A hair short of the end, where the tool may stand on the floor of the opening.
   constexpr double kShort_m = 5e-4;
-  const auto inserted = reach((task.insertion_depth_m - kShort_m) * UnitVector(task.insertion));
-  if (!inserted || !exact_.Free(*inserted)) return false;
+  const Eigen::Translation3d inserted((task.insertion_depth_m - kShort_m) * UnitVector(task.insertion));
+  for (const Pose& target : env::TargetCandidates(task, world_T_target, largest_)) {
+    exact_.SetTargetPoses({target});
+    env::JointVector q = start_rad;
+    if (!env::SolveNearby(*scene_, target * inserted, q, kMostJointTurn_rad) || !exact_.Free(q)) return false;
+  }
+  exact_.SetTargetPoses({world_T_target});
   const int along = AxisOf(task.insertion);
   const int u = (along + 1) % 3;
   const int v = (along + 2) % 3;
@@ -137,7 +140,6 @@ bool PlacementSampler::BranchServes(const env::JointVector& start_rad, const Pos
     const auto q = reach(place);
     clear = q && exact_.Free(*q);
   }
-  exact_.SetTargetPoses({world_T_target});
   return clear;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/pose.h"
 #include "core/random.h"
@@ -59,6 +60,7 @@ class PlacementSampler {
 
   std::shared_ptr<const env::Scene> scene_;
   Workspace workspace_;
+  std::vector<int> largest_;    ///< extents, one per axis of the task
   env::TransferChecker roomy_;  ///< with the clearance of transfers
   env::TransferChecker exact_;  ///< without: the inserted tool is closer to the target than any clearance
   env::DataHandle data_;
