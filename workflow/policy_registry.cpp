@@ -56,13 +56,17 @@ struct Entry {
   PolicyPointer (*make)(const PolicyRequest& request, const Shared& shared);
 };
 
+/// Expansions a step for a problem that the database does not hold: a budget that gives the same policy everywhere.
+constexpr std::int64_t kOutsideExpansions = 3000;
+
 PolicyPointer MakeDatabase(const PolicyRequest& request, const Shared& shared) {
   const auto stored = shared.database->Get(request.extents);
-  if (!stored || !stored->policy) {
-    throw InputError(shared.database->path(), "holds no policy for problem " + planner::ToString(request.extents),
-                     "add it with feeler preprocess --family " + planner::ToString(request.extents));
+  if (stored && stored->policy) {
+    return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::Policy>(*stored->policy));
   }
-  return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::Policy>(*stored->policy));
+  policies::OnlineOptions online = shared.options.online;
+  if (!online.expansion_limit) online.expansion_limit = kOutsideExpansions;
+  return std::make_unique<policies::OnlinePolicy>(online, shared.tables);
 }
 
 PolicyPointer MakeOnline(const PolicyRequest& /*request*/, const Shared& shared) {

@@ -26,8 +26,8 @@ struct PolicyRequest {
   std::uint64_t episode = 0;
 };
 
-/// Gives the policy for an episode; called once each. Safe to call from several threads. Throws InputError if there is
-/// no policy for the problem.
+/// Gives the policy for an episode; called once each. Safe to call from several threads. A problem that the database
+/// does not hold is planned for online: the policy's name says so. Throws InputError for a damaged database.
 using PolicyFactory = std::function<std::unique_ptr<policies::Policy>(const PolicyRequest& request)>;
 
 /// Options of policies; each policy reads those that concern it.

@@ -115,6 +115,23 @@ TEST(Run, InsertsByTouchWhereBlindInsertionFails) {
   EXPECT_EQ(blind.at("failures").empty(), blind.at("inserted") == 10);
 }
 
+TEST(Run, PlansOnlineForAProblemThatTheDatabaseDoesNotHold) {
+  const auto run = [&](const std::string& extents) {
+    return RunFeeler({"run", "--task", "plug", "--db", Database(), "--extents", extents, "--episodes", "2", "--json"});
+  };
+  const CommandResult held = run("6x6x6");
+  EXPECT_EQ(held.exit_code, 0) << held.err;
+  EXPECT_EQ(held.err.find("solved online"), std::string::npos) << held.err;
+  const CommandResult outside = run("7x6x6");
+  EXPECT_EQ(outside.exit_code, 0) << outside.err;
+  EXPECT_NE(outside.err.find("2 of 2 episodes met problems that " + Database() + " does not hold: solved online"),
+            std::string::npos)
+      << outside.err;
+  const Json summary = Json::parse(outside.out);
+  EXPECT_EQ(summary.at("solved_online"), 2);
+  EXPECT_EQ(summary.at("inserted"), 2);
+}
+
 TEST(Solve, WritesAPolicyFileWhoseLeavesAreTheHypotheses) {
   const std::string file = ScratchFolder("solve") + "/policy.json";
   const CommandResult result = RunFeeler({"solve", "--task", "plug", "--extents", "3x3x2", "--out", file, "--json"});
