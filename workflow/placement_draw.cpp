@@ -49,11 +49,13 @@ PlacementSampler::PlacementSampler(std::shared_ptr<const env::Scene> scene, cons
       workspace_(workspace),
       roomy_(*scene_),
       exact_(*scene_, 0.0),
+      without_target_(*scene_),
       data_(env::MakeData(*scene_->model)) {
   if (!(workspace.lower_m.array() <= workspace.upper_m.array()).all() || !(workspace.yaw_rad >= 0.0)) {
     throw InputError("workspace", "its lower bounds lie above the upper", "swap them");
   }
   env::ResetScene(*scene_, scene_->home_q_rad, *data_);
+  without_target_.SetTargetPoses({Eigen::Translation3d(0.0, 0.0, kOutOfTheWay_m) * scene_->task.world_T_target});
   for (const UncertainAxis& axis : scene_->task.axes) largest_.push_back(axis.max_cells);
 }
 
@@ -115,7 +117,8 @@ bool PlacementSampler::BranchServes(const env::JointVector& start_rad, const Pos
   for (const Pose& target : env::TargetCandidates(task, world_T_target, largest_)) {
     exact_.SetTargetPoses({target});
     env::JointVector q = start_rad;
-    if (!env::SolveNearby(*scene_, target * inserted, q, kMostJointTurn_rad) || !exact_.Free(q)) return false;
+    if (!env::SolveNearby(*scene_, target * inserted, q, kMostJointTurn_rad)) return false;
+    if (!exact_.Free(q) || !without_target_.Free(q)) return false;
   }
   exact_.SetTargetPoses({world_T_target});
   const int along = AxisOf(task.insertion);
@@ -131,14 +134,13 @@ bool PlacementSampler::BranchServes(const env::JointVector& start_rad, const Pos
     if (!q || !exact_.Free(*q)) return false;
   }
   // Touches go as deep as the inserted tool: beside the target they must not meet the bench, which no policy knows.
-  exact_.SetTargetPoses({Eigen::Translation3d(0.0, 0.0, kOutOfTheWay_m) * world_T_target});
   bool clear = true;
   for (int corner = 0; corner < 4 && clear; ++corner) {
     Eigen::Vector3d place = task.insertion_depth_m * UnitVector(task.insertion);
     place[u] += (corner & 1) != 0 ? task.workspace_m[u] : -task.workspace_m[u];
     place[v] += (corner & 2) != 0 ? task.workspace_m[v] : -task.workspace_m[v];
     const auto q = reach(place);
-    clear = q && exact_.Free(*q);
+    clear = q && without_target_.Free(*q);
   }
   return clear;
 }

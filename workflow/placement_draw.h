@@ -60,9 +60,10 @@ class PlacementSampler {
 
   std::shared_ptr<const env::Scene> scene_;
   Workspace workspace_;
-  std::vector<int> largest_;    ///< extents, one per axis of the task
-  env::TransferChecker roomy_;  ///< with the clearance of transfers
-  env::TransferChecker exact_;  ///< without: the inserted tool is closer to the target than any clearance
+  std::vector<int> largest_;             ///< extents, one per axis of the task
+  env::TransferChecker roomy_;           ///< with the clearance of transfers
+  env::TransferChecker exact_;           ///< without: the inserted tool is closer to the target than any clearance
+  env::TransferChecker without_target_;  ///< with the clearance of transfers, the target out of the way
   env::DataHandle data_;
 };
 

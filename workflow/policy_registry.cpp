@@ -197,11 +197,11 @@ struct Tuned {
   double hybrid_threshold_m;
 };
 
-// Starting points: the full sizes of `feeler experiment spiral-tuning` and `baselines` are what these should come from
-// (docs/experiments.md says what was run). The last one serves every task that is not named.
+// Measured by `feeler experiment spiral-tuning` (the spirals) and `baselines` (the thresholds, where spiral and touch
+// take the same time): docs/experiments.md. The last one serves every task that is not named.
 constexpr Tuned kTuned[] = {
-    {"plug", {0.0015, 0.02, 10.0}, 0.008},
-    {"plug-tight", {0.0004, 0.02, 10.0}, 0.0025},
+    {"plug", {0.0035, 0.08, 20.0}, 0.008},
+    {"plug-tight", {0.0006, 0.04, 20.0}, 0.0025},
 };
 
 const Tuned& TunedFor(const Task& task) {
