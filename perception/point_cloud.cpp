@@ -44,22 +44,9 @@ void ForEachCube(const std::vector<std::pair<Key, std::size_t>>& order, const Vi
   }
 }
 
-}  // namespace
-
-Points Thinned(const Points& points, double cell_m) {
-  const auto order = ByCube(points, cell_m);
-  Points thinned;
-  ForEachCube(order, [&](std::size_t first, std::size_t last) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = first; i < last; ++i) sum += points[order[i].second];
-    thinned.push_back(sum / static_cast<double>(last - first));
-  });
-  return thinned;
-}
-
-SurfacePoints Thinned(const SurfacePoints& surface, double cell_m) {
+/// Adds one point for each cube that holds any of `surface`.
+void ThinInto(const SurfacePoints& surface, double cell_m, SurfacePoints& thinned) {
   const auto order = ByCube(surface.points, cell_m);
-  SurfacePoints thinned;
   ForEachCube(order, [&](std::size_t first, std::size_t last) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -77,6 +64,33 @@ SurfacePoints Thinned(const SurfacePoints& surface, double cell_m) {
       thinned.normals.push_back(normal.normalized());
     }
   });
+}
+
+}  // namespace
+
+Points Thinned(const Points& points, double cell_m) {
+  const auto order = ByCube(points, cell_m);
+  Points thinned;
+  ForEachCube(order, [&](std::size_t first, std::size_t last) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = first; i < last; ++i) sum += points[order[i].second];
+    thinned.push_back(sum / static_cast<double>(last - first));
+  });
+  return thinned;
+}
+
+SurfacePoints Thinned(const SurfacePoints& surface, double cell_m) {
+  // Faces that look different ways are thinned apart: both faces of a plate thinner than a cube remain.
+  std::array<SurfacePoints, 6> by_facing;
+  for (std::size_t i = 0; i < surface.points.size(); ++i) {
+    Eigen::Index axis = 0;
+    surface.normals[i].cwiseAbs().maxCoeff(&axis);
+    SurfacePoints& group = by_facing[static_cast<std::size_t>(2 * axis) + (surface.normals[i][axis] < 0.0 ? 1 : 0)];
+    group.points.push_back(surface.points[i]);
+    group.normals.push_back(surface.normals[i]);
+  }
+  SurfacePoints thinned;
+  for (const SurfacePoints& group : by_facing) ThinInto(group, cell_m, thinned);
   return thinned;
 }
 

@@ -18,7 +18,8 @@ struct SurfacePoints {
 /// the order of `points`.
 Points Thinned(const Points& points, double cell_m);
 
-/// The same for a surface; the normal is the mean, made unit; cubes where normals cancel keep their first point.
+/// The same for a surface, faces that look different ways apart; normals are means, made unit, or a first where they
+/// cancel.
 SurfacePoints Thinned(const SurfacePoints& surface, double cell_m);
 
 }  // namespace feeler::perception

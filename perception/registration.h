@@ -69,6 +69,7 @@ struct Registration {
 
 /// Finds the target in a scene without background (world frame), seen from `eye_m`: clusters, densest first; each from
 /// several starts, rough fits, the best of them refined; the best fit wins. A poor one: once more, from more starts.
+/// What is turned by more than 25 degrees is not looked for.
 ///
 /// Point-to-plane ICP (Chen and Medioni 1992) from scene to what the eye sees of the model, blended with a term along
 /// the faces in both directions, by Gauss-Newton in position and the given turns; pairs beyond a shrinking gate are

@@ -80,7 +80,7 @@ struct TableOptions {
   /// The half extents of a rule are the sum of two: what holds this share of its samples on all axes at once about the
   /// mean of their installation, times `margin`;
   double quantile = 0.995;
-  double margin = 1.2;
+  double margin = 1.1;
   /// and so many standard deviations of the means of installations, axis by axis. A mounting errs within limits: for an
   /// error uniform between limits 1.7 deviations are its end. Few installations know the deviation badly, hence more.
   double installation_deviations = 3.0;

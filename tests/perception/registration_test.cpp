@@ -1,7 +1,8 @@
 // Laws: registration recovers a known pose from noisy points, wherever the target stands (oracle: the pose that made
 // the scene); a rigid motion of camera, scene and nominal orientation moves the result along; the order of points does
 // not matter, bit for bit; points that are not finite do not either; other things beside the target and before it do
-// not draw it away; nothing, too little, and something else than the target are "not found", with a reason.
+// not draw it away; nothing, too little, and something else than the target are "not found", with a reason. Nothing is
+// found turned farther than is looked for. Thinning keeps both faces of a plate that is thinner than its cubes.
 #include "perception/registration.h"
 
 #include <gtest/gtest.h>
@@ -145,6 +146,43 @@ TEST(Registration, WhatIsNotThereIsNotFound) {
     post.emplace_back(0.5 + 0.03 * std::cos(angle), 0.03 * std::sin(angle), random.Uniform(0.0, 0.3));
   }
   EXPECT_NE(reason(post), "");
+}
+
+TEST(Registration, NothingIsFoundTurnedTooFar) {
+  RandomStream random(8, 0, "turned");
+  constexpr double kMost_rad = 0.45;
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    Pose truth = DrawPose(random);
+    truth.linear() = Eigen::AngleAxisd(random.Uniform(0.6, 2.5), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Registration found = Register(SyntheticScene(truth, kEye, 0.002, k), Model(), kUpright, kEye);
+    if (found.found) {
+      EXPECT_LT(Eigen::AngleAxisd(found.world_T_target.linear()).angle(), kMost_rad) << k;
+    }
+  }
+}
+
+TEST(PointCloud, ThinningKeepsBothFacesOfAThinPlate) {
+  constexpr double kThickness_m = 0.006;
+  constexpr double kCube_m = 0.02;
+  constexpr int kSide = 100;
+  SurfacePoints plate;
+  for (int i = 0; i < kSide; ++i) {
+    for (int j = 0; j < kSide; ++j) {
+      for (const double side : {-1.0, 1.0}) {
+        plate.points.emplace_back(0.001 + 0.002 * i, 0.001 + 0.002 * j, 0.01 + side * kThickness_m / 2.0);
+        plate.normals.emplace_back(0.0, 0.0, side);
+      }
+    }
+  }
+  const SurfacePoints thinned = Thinned(plate, kCube_m);
+  const auto up = std::count_if(thinned.normals.begin(), thinned.normals.end(),
+                                [](const Eigen::Vector3d& n) { return n.isApprox(Eigen::Vector3d::UnitZ()); });
+  constexpr int kCubes = 100;  // 0.2 m square
+  EXPECT_EQ(up, kCubes);
+  ASSERT_EQ(thinned.points.size(), 2 * kCubes);
+  for (std::size_t i = 0; i < thinned.points.size(); ++i) {
+    EXPECT_NEAR(thinned.points[i].z(), 0.01 + thinned.normals[i].z() * kThickness_m / 2.0, 1e-12);
+  }
 }
 
 TEST(Registration, NonsenseIsRefused) {
