@@ -196,6 +196,13 @@ MotionResult SimulatedRobot::Guard(const std::function<MotionResult()>& motion) 
   }
 }
 
+std::string SimulatedRobot::ProtectiveStop() const {
+  std::string text = "protective stop: the arm touches something";
+  const auto [first, second] = sensor_.ArmContact();
+  if (first < 0) return text;
+  return text + " (" + NameOfGeom(world_.model(), first) + ", " + NameOfGeom(world_.model(), second) + ")";
+}
+
 bool SimulatedRobot::IsContact(const Watch& watch, bool& released) const {
   if (sensor_.ArmForce() > options_.protective_force_n) return true;
   const Eigen::Vector3d& force = sensor_.raw().force_n;
@@ -252,7 +259,7 @@ MotionResult SimulatedRobot::Follow(double duration_s, const ReferenceAt& refere
       const bool arm = sensor_.ArmForce() > options_.protective_force_n;
       result.reason = arm || watch.protective ? StopReason::kAborted : StopReason::kContact;
       if (arm) {
-        result.detail = "protective stop: the arm touches something";
+        result.detail = ProtectiveStop();
       } else if (watch.protective) {
         result.detail = "protective stop: contact during a transfer";
       }
@@ -451,7 +458,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
           sensor_.ArmForce() > options_.protective_force_n) {
         const bool arm = sensor_.ArmForce() > options_.protective_force_n;
         result.reason = arm ? StopReason::kAborted : StopReason::kForceLimit;
-        if (arm) result.detail = "protective stop: the arm touches something";
+        if (arm) result.detail = ProtectiveStop();
         result.contact = true;
         break;
       }
@@ -520,7 +527,7 @@ MotionResult SimulatedRobot::FollowTwist(const TwistMotion& motion) {
         result.world_T_tool = tool_at_sensing_;
         const bool arm = sensor_.ArmForce() > options_.protective_force_n;
         result.reason = arm ? StopReason::kAborted : StopReason::kContact;
-        if (arm) result.detail = "protective stop: the arm touches something";
+        if (arm) result.detail = ProtectiveStop();
         break;
       }
     }

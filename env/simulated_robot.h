@@ -172,6 +172,8 @@ class SimulatedRobot : public Robot {
   /// Reads the encoders.
   void Sense();
   void StepOnce(const JointVector& torque_nm);
+  /// Why the robot stopped by itself.
+  std::string ProtectiveStop() const;
   bool IsContact(const Watch& watch, bool& released) const;
   /// The end of a motion that did not begin: world failed or time over.
   std::optional<MotionResult> Refused() const;

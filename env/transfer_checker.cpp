@@ -57,13 +57,13 @@ Eigen::VectorXd NearestTwin(const Eigen::VectorXd& q, const JointVector& start, 
   return twin;
 }
 
-std::string BodyOfGeom(const mjModel& model, int geom) {
+}  // namespace
+
+std::string NameOfGeom(const mjModel& model, int geom) {
   const char* name = mj_id2name(&model, mjOBJ_GEOM, geom);
   if (name == nullptr) name = mj_id2name(&model, mjOBJ_BODY, model.geom_bodyid[geom]);
   return name == nullptr ? "unnamed geom" : name;
 }
-
-}  // namespace
 
 TransferChecker::TransferChecker(const Scene& scene, double clearance_m)
     : scene_(scene), targets_{scene.task.world_T_target}, clearance_m_(clearance_m), reach_m_(Reach(scene)) {
@@ -107,7 +107,7 @@ bool TransferChecker::Free(const JointVector& q_rad) {
 std::string TransferChecker::Collision(const JointVector& q_rad) {
   if (Free(q_rad)) return "";
   const mjContact& contact = data_->contact[0];
-  return BodyOfGeom(*model_, contact.geom1) + " and " + BodyOfGeom(*model_, contact.geom2);
+  return NameOfGeom(*model_, contact.geom1) + " and " + NameOfGeom(*model_, contact.geom2);
 }
 
 planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,

@@ -62,6 +62,9 @@ struct TransferSettings {
 planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
                                    const Pose& world_T_tool, const TransferSettings& settings = {});
 
+/// A geom for people: its name, or that of its body.
+std::string NameOfGeom(const mjModel& model, int geom);
+
 /// The corners and the centre of the box in which the target may stand: candidates for SetTargetPoses.
 /// `half_extents_m` along the axes of `estimate`.
 std::vector<Pose> TargetCandidates(const Pose& estimate, const Eigen::Vector3d& half_extents_m);

@@ -81,17 +81,19 @@ std::string PlacementSampler::Obstacle(const Pose& world_T_target) {
       env::ToolInverseKinematics(*scene_, env::StartPose(scene_->task, world_T_target));
   if (branches.empty()) return "the start pose is out of reach";
   if (!TargetIsFree(world_T_target)) return "the target overlaps a fixture";
-  // As transfers see it: the target stands anywhere in the largest box.
-  roomy_.SetTargetPoses(env::TargetCandidates(scene_->task, world_T_target, largest_));
+  // Transfers keep clear of the whole box of hypotheses, which may be any up to the largest.
+  const std::vector<Pose> largest_box = env::TargetCandidates(scene_->task, world_T_target, largest_);
+  roomy_.SetTargetPoses(largest_box);
   if (!roomy_.Free(scene_->home_q_rad)) return "the target overlaps the arm at home";
-  // A transfer may end in any branch that is free.
-  bool any = false;
-  for (const env::JointVector& start : branches) {
-    if (!roomy_.Free(start)) continue;
-    if (!BranchServes(start, world_T_target)) return "a branch of the arm cannot make the moves";
-    any = true;
+  if (std::none_of(branches.begin(), branches.end(), [&](const env::JointVector& q) { return roomy_.Free(q); })) {
+    return "the arm or its tool is in collision at the start pose";
   }
-  return any ? "" : "the arm or its tool is in collision at the start pose";
+  // A transfer may end in any branch that is free for a small box.
+  roomy_.SetTargetPoses({world_T_target});
+  for (const env::JointVector& start : branches) {
+    if (roomy_.Free(start) && !BranchServes(start, world_T_target)) return "a branch of the arm cannot make the moves";
+  }
+  return "";
 }
 
 bool PlacementSampler::TargetIsFree(const Pose& world_T_target) {

@@ -114,6 +114,8 @@ void ContactSensor::Update(const World& world) {
   std::array<Eigen::Vector3d, kContactPairCount> pair;
   pair.fill(Eigen::Vector3d::Zero());
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();
+  arm_contact_ = {-1, -1};
+  double strongest_n = 0.0;
   const Eigen::Vector3d origin = world.ToolPoseAtContact().translation();
   for (const ContactForce& c : world.contacts()) {
     const Side& side1 = geom_[static_cast<std::size_t>(c.geom1)];
@@ -131,7 +133,12 @@ void ContactSensor::Update(const World& world) {
     }
     const bool arm1 = side1.part == ScenePart::kRobot && !side1.beyond_sensor;
     const bool arm2 = side2.part == ScenePart::kRobot && !side2.beyond_sensor;
-    if (arm1 || arm2) arm += (arm2 ? 1.0 : -1.0) * c.force_n;
+    if (!arm1 && !arm2) continue;
+    arm += (arm2 ? 1.0 : -1.0) * c.force_n;
+    if (c.force_n.norm() > strongest_n) {
+      strongest_n = c.force_n.norm();
+      arm_contact_ = {c.geom1, c.geom2};
+    }
   }
   arm_force_ = arm.norm();
   const double gain = filter_.Gain(world.timestep_s());

@@ -81,6 +81,8 @@ class ContactSensor {
   bool ToolFlag() const;
   /// Net force on the arm (not gripper, not tool) by anything, N: what joint torques would reveal.
   double ArmForce() const { return arm_force_; }
+  /// The two geoms of the strongest contact on the arm; -1 if there is none.
+  const std::array<int, 2>& ArmContact() const { return arm_contact_; }
 
  private:
   Wrench Measure(const Wrench& exact);
@@ -106,6 +108,7 @@ class ContactSensor {
   std::array<double, kContactPairCount> pair_filtered_{};
   std::array<Hysteresis, kContactPairCount> pair_flag_{};
   double arm_force_ = 0.0;
+  std::array<int, 2> arm_contact_ = {-1, -1};
 };
 
 }  // namespace feeler::env
