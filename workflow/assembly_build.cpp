@@ -27,6 +27,7 @@ namespace {
 constexpr int kAttempts = 2;  ///< of an insertion, each from an estimate of its own
 constexpr double kStraightSpeed_m_s = 0.15;
 constexpr double kContact_n = 15.0;  ///< on the way to a grasp, off a part and out of the rack nothing should be met
+constexpr double kStuck_n = 60.0;    ///< a part that does not come off a port for less stays there
 
 /// Ends a build; what() says why.
 class BuildStop : public std::runtime_error {
@@ -92,6 +93,13 @@ class StageRobot {
     const Eigen::Vector3d outward = -UnitVector(scene_->task.insertion);
     const Pose goal = robot_.ToolPose() * Eigen::Translation3d(way_m * outward);
     Require(robot_.LinearMove(goal, kStraightSpeed_m_s, kContact_n), what);
+  }
+
+  /// Off a port that a part may be stuck in. Whatever comes of it, the transfer that follows says whether it is free.
+  void ComeOff() {
+    const Eigen::Vector3d outward = -UnitVector(scene_->task.insertion);
+    robot_.LinearMove(robot_.ToolPose() * Eigen::Translation3d(kApproach_m * outward), kStraightSpeed_m_s, kStuck_n);
+    robot_.ZeroWrench();
   }
 
   /// To a tool pose, in one of these branches of the arm; the target is thought to stand at any of `targets`.
@@ -213,7 +221,6 @@ class Builder {
     const Task& task = tasks_.at(insertion.task).setup->task();
     const Pose& world_T_into = poses_[static_cast<std::size_t>(insertion.into)];
     step.world_T_true = TargetPoseOf(assembly_, insertion, world_T_into);
-    if (options_.disturb_port) step.world_T_true = options_.disturb_port(i, step.world_T_true);
     const Pose drawn = TargetPoseOf(assembly_, insertion, plan_.world_T_part[static_cast<std::size_t>(insertion.into)]);
     step.drawn_error = PoseErrorOf(task, drawn, step.world_T_true);
 
@@ -235,11 +242,11 @@ class Builder {
       }
       Leave(*stage, step);
     }
-    const auto stage = Enter(InsertScene(i, step.world_T_true), 2 * i + 1, caption);
+    const auto stage = Enter(Stage(i, StagePhase::kInsert), 2 * i + 1, caption);
     try {
       stage->Straight(kApproach_m, "lifting the part");
       for (int attempt = 0; attempt < (options_.ladder ? kAttempts : 1) && !step.inserted; ++attempt) {
-        if (attempt > 0) stage->Straight(kApproach_m, "off the port");
+        if (attempt > 0) stage->ComeOff();
         Attempt(i, attempt, *stage, step);
       }
     } catch (...) {
@@ -253,15 +260,6 @@ class Builder {
       poses_[static_cast<std::size_t>(insertion.part)] = step.world_T_part;
     }
     Leave(*stage, step);
-  }
-
-  /// The stage of an insertion with the port where it truly is.
-  std::shared_ptr<const env::Scene> InsertScene(std::size_t i, const Pose& world_T_true) const {
-    StageLayout layout{i, StagePhase::kInsert, plan_.grip_turn_rad[i], poses_};
-    const AssemblyInsertion& insertion = assembly_.insertions[i];
-    layout.world_T_part[static_cast<std::size_t>(insertion.into)] =
-        world_T_true * assembly_.PortOf(insertion).part_T_target.inverse();
-    return std::make_shared<const env::Scene>(BuildStage(assembly_, layout));
   }
 
   void Attempt(std::size_t i, int number, StageRobot& stage, AssemblyStepRecord& step) {
@@ -279,6 +277,7 @@ class Builder {
     RandomStream offset = stream("estimate");
     const Pose estimate_T_true = env::DrawTruePose(task, Pose::Identity(), AxisExtents(task, attempt.extents), offset);
     attempt.world_T_estimate = step.world_T_true * estimate_T_true.inverse();
+    if (options_.disturb_estimate) attempt.world_T_estimate = options_.disturb_estimate(i, attempt.world_T_estimate);
 
     const planner::Problem problem = planner::MakeCuboidProblem(task, of.setup->map, attempt.extents);
     FoundPolicy found = FindPolicy(of, problem, attempt.extents);

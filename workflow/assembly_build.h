@@ -55,10 +55,10 @@ struct AssemblyOptions {
   AssemblyFilm* film = nullptr;
   ProgressCallback progress;  ///< insertions done
   const CancellationToken* cancellation = nullptr;
-  /// What happens behind the robot's back, for tests: where a part truly ends that was left at a pose, and where a port
-  /// truly is.
+  /// What goes wrong behind the robot's back, for tests: where a part truly ends that was left at a pose, and what is
+  /// told of a port instead of its estimate.
   std::function<Pose(std::size_t insertion, const Pose& world_T_part)> disturb_part;
-  std::function<Pose(std::size_t insertion, const Pose& world_T_target)> disturb_port;
+  std::function<Pose(std::size_t insertion, const Pose& world_T_estimate)> disturb_estimate;
 };
 
 /// Builds an assembly in simulation: for each insertion the robot fetches the part from where it lies, carries it

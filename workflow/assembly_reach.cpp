@@ -1,5 +1,7 @@
 #include "workflow/assembly_reach.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -11,16 +13,39 @@
 namespace feeler::workflow {
 namespace {
 
-/// How far any joint may turn between the start pose and the places around it; a branch that has to turn farther is
-/// near a singularity, where straight motions crawl.
-constexpr double kMostJointTurn_rad = 0.9;
+/// How far any joint may turn between the start pose and the places around it, and how fast for the way of the tool: a
+/// branch that has to turn farther or faster is near a singularity, where straight motions crawl or end.
+constexpr double kMostJointTurn_rad = 1.2;
+constexpr double kMostTurn_rad_m = 12.0;
 /// A hair short of the end, where a part may stand on a floor.
 constexpr double kShort_m = 5e-4;
 constexpr int kFarIterations = 20000;
 
+/// Whether the tool can move along any direction without the joints having to race: far enough from a singularity.
+bool MovesFreely(const env::Scene& scene, const env::JointVector& q_rad) {
+  const Eigen::PartialPivLU<env::Matrix6> jacobian(env::ToolJacobian(scene, q_rad));
+  const env::Matrix6 inverse = jacobian.inverse();
+  if (!inverse.allFinite()) return false;
+  for (int joint = 0; joint < env::kJointCount; ++joint) {
+    if (inverse.row(joint).head<3>().norm() > kMostTurn_rad_m) return false;
+  }
+  return true;
+}
+
+/// Straight from where the tool is at `from_rad` to `goal`.
 std::optional<env::JointVector> Follow(const env::Scene& scene, const env::JointVector& from_rad, const Pose& goal) {
+  constexpr int kSteps = 4;
+  const Pose from = env::ToolForwardKinematics(scene, from_rad);
+  const Eigen::Quaterniond from_turn(from.linear());
+  const Eigen::Quaterniond goal_turn(goal.linear());
   env::JointVector q = from_rad;
-  if (!env::SolveNearby(scene, goal, q, kMostJointTurn_rad)) return std::nullopt;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double share = static_cast<double>(i) / kSteps;
+    const Pose pose =
+        MakePose((1.0 - share) * from.translation() + share * goal.translation(), from_turn.slerp(share, goal_turn));
+    if (!env::SolveNearby(scene, pose, q, kMostJointTurn_rad / kSteps)) return std::nullopt;
+    if (!MovesFreely(scene, q)) return std::nullopt;
+  }
   return q;
 }
 
@@ -34,14 +59,16 @@ planner::JointBounds JointLimits(const env::Scene& scene) {
   return limits;
 }
 
-/// The same place of all links, each joint as near to `start` as whole turns and the bounds allow.
+/// The same place of all links, each joint as near to `start` as whole turns and the bounds allow, with room for the
+/// straight motions that follow.
 Eigen::VectorXd NearestTwin(const env::JointVector& q, const env::JointVector& start,
                             const planner::JointBounds& bounds) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   Eigen::VectorXd twin = q;
   for (int i = 0; i < env::kJointCount; ++i) {
     for (const double other : {q[i] - kTurn, q[i] + kTurn}) {
-      const bool allowed = other >= bounds.lower_rad[i] && other <= bounds.upper_rad[i];
+      const bool allowed =
+          other >= bounds.lower_rad[i] + kMostJointTurn_rad && other <= bounds.upper_rad[i] - kMostJointTurn_rad;
       if (allowed && std::abs(other - start[i]) < std::abs(twin[i] - start[i])) twin[i] = other;
     }
   }
