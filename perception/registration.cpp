@@ -227,7 +227,9 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
     }
   }
   best.found = best.fitness >= options.least_fitness;
-  if (!best.found) {
+  if (!best.found && best.points == 0) {
+    best.reason = fmt::format("every fit is turned by more than {:.0f} degrees", kMostTurn_rad * 57.29577951308232);
+  } else if (!best.found) {
     best.reason = fmt::format("the best fit meets {:.0f} % of what should be seen of the target, below {:.0f} %",
                               100.0 * best.fitness, 100.0 * options.least_fitness);
   }
