@@ -96,6 +96,7 @@ std::string Joined(const std::vector<std::string>& names) {
 template <class Things>
 std::string NamesOf(const Things& things) {
   std::vector<std::string> names;
+  names.reserve(things.size());
   for (const auto& thing : things) names.push_back(thing.name);
   return Joined(names);
 }
@@ -161,7 +162,7 @@ class Loader {
   }
 
   static fs::path ExistingFile(const Node& node, const fs::path& folder) {
-    const fs::path file = fs::absolute(folder / node.Text()).lexically_normal();
+    fs::path file = fs::absolute(folder / node.Text()).lexically_normal();
     if (!fs::is_regular_file(file)) node.Fail("there is no file " + file.string(), "name one that exists");
     return file;
   }
