@@ -7,6 +7,14 @@
 
 namespace feeler::workflow {
 
+Pose WithKnownPlace(const Task& task, const Pose& world_T_estimate, const Pose& world_T_target) {
+  Eigen::Vector3d known = (world_T_estimate.inverse() * world_T_target).translation();
+  for (const UncertainAxis& axis : task.axes) {
+    if (!axis.angular()) known[static_cast<int>(axis.kind)] = 0.0;
+  }
+  return world_T_estimate * Eigen::Translation3d(known);
+}
+
 EpisodeDraw DrawPerceived(const Task& task, const EpisodePerception& perception, const planner::ProblemFamily& family,
                           std::uint64_t seed, std::uint64_t episode, CameraCell& cell) {
   RandomStream places(seed, episode, "placement");
@@ -24,7 +32,7 @@ EpisodeDraw DrawPerceived(const Task& task, const EpisodePerception& perception,
     return draw;
   }
   const perception::PoseHypotheses hypotheses = HypothesesFor(perception.table, found.world_T_target);
-  draw.world_T_estimate = hypotheses.world_T_estimate;
+  draw.world_T_estimate = WithKnownPlace(task, hypotheses.world_T_estimate, placement.world_T_target);
   const auto extents = SnapTo(family, task, hypotheses.counts);
   if (!extents) {
     draw.failure = "no policy: the database has no problem as large as the table asks for";
