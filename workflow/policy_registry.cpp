@@ -200,7 +200,7 @@ struct Tuned {
 // Measured by `feeler experiment spiral-tuning` (the spirals) and `baselines` (the thresholds, where spiral and touch
 // take the same time): docs/experiments.md. The last one serves every task that is not named.
 constexpr Tuned kTuned[] = {
-    {"plug", {0.0025, 0.08, 20.0}, 0.008},
+    {"plug", {0.0025, 0.08, 20.0}, 0.006},
     {"plug-tight", {0.0006, 0.04, 20.0}, 0.0025},
 };
 
