@@ -78,7 +78,23 @@ Eigen::VectorXd NearestTwin(const env::JointVector& q, const env::JointVector& s
 }  // namespace
 
 StageReach::StageReach(std::shared_ptr<const env::Scene> scene)
-    : scene_(std::move(scene)), roomy_(*scene_), exact_(*scene_, 0.0) {}
+    : scene_(std::move(scene)), roomy_(*scene_), exact_(*scene_, 0.0), data_(env::MakeData(*scene_->model)) {}
+
+std::string StageReach::ArmCollision(const env::JointVector& q_rad, const Pose& world_T_target) {
+  const mjModel& model = *scene_->model;
+  env::SetJointPositions(*scene_, q_rad, *data_);
+  env::SetTargetPose(*scene_, world_T_target, *data_);
+  mj_kinematics(&model, data_.get());
+  mj_collision(&model, data_.get());
+  env::TakeMujocoWarning();  // a full buffer holds contacts enough
+  const auto part = [&](int geom) { return scene_->geom_part[static_cast<std::size_t>(geom)]; };
+  for (int i = 0; i < data_->ncon; ++i) {
+    const mjContact& contact = data_->contact[i];
+    if (part(contact.geom1) == env::ScenePart::kTool || part(contact.geom2) == env::ScenePart::kTool) continue;
+    return env::NameOfGeom(model, contact.geom1) + " and " + env::NameOfGeom(model, contact.geom2);
+  }
+  return "";
+}
 
 std::string StageReach::Approaches(const env::JointVector& q_rad, const Pose& world_T_grasp) {
   if (!roomy_.Free(q_rad)) return roomy_.Collision(q_rad);
@@ -129,11 +145,19 @@ std::string StageReach::Starts(const env::JointVector& q_rad, const Pose& world_
     Eigen::Vector3d place = task.start_offset_m;
     place[u] += task.workspace_center_m[u] + ((corner & 1) != 0 ? task.workspace_m[u] : -task.workspace_m[u]);
     place[v] += task.workspace_center_m[v] + ((corner & 2) != 0 ? task.workspace_m[v] : -task.workspace_m[v]);
-    // Down there the part itself may meet the target, so the arm is asked about half way to the mouth.
+    // Down there the part itself may meet the target, so all of it is asked about half way to the mouth only.
+    const double bottom =
+        task.start_offset_m[along] + task.workspace_center_m[along] + inward[along] * task.workspace_m[along];
     if ((corner & 4) != 0) place[along] *= 0.5;
     const auto q = at(place);
     if (!q) return "a corner of the workspace of the task is out of reach";
     if (!exact_.Free(*q)) return exact_.Collision(*q) + " at a corner of the workspace of the task";
+    if ((corner & 4) == 0) continue;
+    place[along] = bottom;
+    const auto below = at(place);
+    if (!below) return "a corner of the workspace of the task is out of reach";
+    const std::string touched = ArmCollision(*below, world_T_target);
+    if (!touched.empty()) return touched + " at a lower corner of the workspace of the task";
   }
   const auto away = Follow(*scene_, *inserted,
                            world_T_target * Eigen::Translation3d((task.insertion_depth_m - kApproach_m) * inward));

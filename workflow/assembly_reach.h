@@ -30,8 +30,8 @@ class StageReach {
   ServingBranches AtApproach(const Pose& world_T_grasp);
 
   /// With the tool at `world_T_start` over a target that is believed at `world_T_target`: from there to the corners of
-  /// the workspace of the task, to the end of the insertion and, with the part left there, away; all of it free. Scene
-  /// of kInsert.
+  /// the workspace of the task (the lower ones: the arm; the part may meet the target there), to the end of the
+  /// insertion and, with the part left there, away; all of it free. Scene of kInsert.
   ServingBranches AtStart(const Pose& world_T_target, const Pose& world_T_start);
 
   env::TransferChecker& transfers() { return roomy_; }
@@ -39,10 +39,13 @@ class StageReach {
  private:
   std::string Approaches(const env::JointVector& q_rad, const Pose& world_T_grasp);
   std::string Starts(const env::JointVector& q_rad, const Pose& world_T_target);
+  /// What the arm without the part touches; empty: nothing.
+  std::string ArmCollision(const env::JointVector& q_rad, const Pose& world_T_target);
 
   std::shared_ptr<const env::Scene> scene_;
   env::TransferChecker roomy_;  ///< with the clearance of transfers
   env::TransferChecker exact_;  ///< without: a part that fits is nearer than any clearance
+  env::DataHandle data_;
 };
 
 /// A way for the arm to one of these configurations, or to one a whole turn of some joints away. First within half a
