@@ -201,7 +201,7 @@ struct Tuned {
 // take the same time): docs/experiments.md. The last one serves every task that is not named.
 constexpr Tuned kTuned[] = {
     {"plug", {0.0025, 0.08, 20.0}, 0.006},
-    {"plug-tight", {0.0006, 0.04, 20.0}, 0.0025},
+    {"plug-tight", {0.0006, 0.04, 20.0}, 0.0},
 };
 
 const Tuned& TunedFor(const Task& task) {
