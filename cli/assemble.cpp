@@ -34,12 +34,6 @@ struct Flags {
   bool json = false;
 };
 
-std::string Joined(const std::vector<std::string>& names) {
-  std::string joined;
-  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
-  return joined;
-}
-
 void RequireSane(const Flags& flags) {
   if (flags.builds < 1) throw InputError("--builds", fmt::format("{}", flags.builds), "give 1 or more");
   if (!(flags.video_speed >= 0.25 && flags.video_speed <= 50.0)) {
@@ -190,7 +184,8 @@ void AddAssembleCommand(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("assemble", "Builds a structure in simulation, insertion by insertion");
   command
       ->add_option("--assembly", flags->assembly,
-                   "name under models/assemblies/ (" + Joined(workflow::ListAssemblies()) + "), or path of a file")
+                   fmt::format("name under models/assemblies/ ({}), or path of a file",
+                               fmt::join(workflow::ListAssemblies(), ", ")))
       ->required();
   command->add_option("--db", flags->databases, "policy database of a task (feeler preprocess); once for each task");
   command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();

@@ -51,12 +51,6 @@ struct Flags {
   bool json = false;
 };
 
-std::string Joined(const std::vector<std::string>& names) {
-  std::string joined;
-  for (const std::string& name : names) joined += (joined.empty() ? "" : ", ") + name;
-  return joined;
-}
-
 /// The names, and a line about each.
 std::string NoiseHelp() {
   std::string help = "one of these, or several with commas between:";
@@ -235,7 +229,8 @@ void AddRunCommand(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("run", "Episodes in simulation: transfer, localize by touch, insert, score");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--db", flags->db, "policy database of the task (feeler preprocess)");
-  command->add_option("--policy", flags->policy, Joined(workflow::PolicyNames()))->capture_default_str();
+  command->add_option("--policy", flags->policy, fmt::format("{}", fmt::join(workflow::PolicyNames(), ", ")))
+      ->capture_default_str();
   command->add_option("--policy-option", flags->policy_options,
                       "KEY=VALUE, an option of the policy (docs/add-a-policy.md); may be given several times");
   command->add_option("--episodes", flags->episodes, "how many")->capture_default_str();

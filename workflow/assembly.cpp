@@ -87,18 +87,12 @@ Pose PoseFrom(const Node& node, const char* position, const char* quaternion) {
   return MakePose(node.At(position).Position(), node.At(quaternion).Quaternion());
 }
 
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
-
 template <class Things>
 std::string NamesOf(const Things& things) {
   std::vector<std::string> names;
   names.reserve(things.size());
   for (const auto& thing : things) names.push_back(thing.name);
-  return Joined(names);
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 template <class Things>
@@ -139,7 +133,7 @@ class Loader {
     if (assembly_.tasks.contains(task)) return;
     const std::vector<std::string> known = env::ListTasks();
     if (std::find(known.begin(), known.end(), task) == known.end() && !fs::exists(task)) {
-      node.Fail(fmt::format("no task is named '{}'", task), "one of " + Joined(known));
+      node.Fail(fmt::format("no task is named '{}'", task), fmt::format("one of {}", fmt::join(known, ", ")));
     }
     assembly_.tasks.emplace(task, std::make_shared<const env::TaskModel>(env::LoadTask(task)));
   }
@@ -310,7 +304,7 @@ Assembly LoadAssembly(const std::string& name) {
   const fs::path file = is_path ? fs::path(name) : env::ModelsFolder() / "assemblies" / (name + ".json");
   if (!fs::is_regular_file(file)) {
     throw InputError("--assembly", fmt::format("no assembly is named '{}' and no file is", name),
-                     "one of " + Joined(ListAssemblies()) + ", or a path");
+                     fmt::format("one of {}, or a path", fmt::join(ListAssemblies(), ", ")));
   }
   Assembly assembly;
   assembly.name = file.stem().string();

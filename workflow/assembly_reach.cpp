@@ -49,6 +49,23 @@ std::optional<env::JointVector> Follow(const env::Scene& scene, const env::Joint
   return q;
 }
 
+/// The branches that nothing is in the way of; what is in the way of the last, if none is left.
+template <class Obstacle>
+ServingBranches Serving(const std::vector<env::JointVector>& branches, const Obstacle& obstacle_of) {
+  ServingBranches serving;
+  serving.obstacle = "out of reach";
+  for (const env::JointVector& q : branches) {
+    std::string obstacle = obstacle_of(q);
+    if (obstacle.empty()) {
+      serving.q_rad.push_back(q);
+    } else {
+      serving.obstacle = std::move(obstacle);
+    }
+  }
+  if (!serving.q_rad.empty()) serving.obstacle.clear();
+  return serving;
+}
+
 planner::JointBounds JointLimits(const env::Scene& scene) {
   planner::JointBounds limits{env::JointVector::Zero(), env::JointVector::Zero()};
   for (int i = 0; i < env::kJointCount; ++i) {
@@ -113,19 +130,8 @@ ServingBranches StageReach::AtApproach(const Pose& world_T_grasp) {
   roomy_.SetTargetPoses({scene_->task.world_T_target});
   exact_.SetTargetPoses({scene_->task.world_T_target});
   const Eigen::Vector3d outward = -UnitVector(scene_->task.insertion);
-  ServingBranches serving;
-  serving.obstacle = "out of reach";
-  for (const env::JointVector& q :
-       env::ToolInverseKinematics(*scene_, world_T_grasp * Eigen::Translation3d(kApproach_m * outward))) {
-    const std::string obstacle = Approaches(q, world_T_grasp);
-    if (obstacle.empty()) {
-      serving.q_rad.push_back(q);
-    } else {
-      serving.obstacle = obstacle;
-    }
-  }
-  if (!serving.q_rad.empty()) serving.obstacle.clear();
-  return serving;
+  return Serving(env::ToolInverseKinematics(*scene_, world_T_grasp * Eigen::Translation3d(kApproach_m * outward)),
+                 [&](const env::JointVector& q) { return Approaches(q, world_T_grasp); });
 }
 
 std::string StageReach::Starts(const env::JointVector& q_rad, const Pose& world_T_target) {
@@ -169,18 +175,8 @@ std::string StageReach::Starts(const env::JointVector& q_rad, const Pose& world_
 ServingBranches StageReach::AtStart(const Pose& world_T_target, const Pose& world_T_start) {
   roomy_.SetTargetPoses({world_T_target});
   exact_.SetTargetPoses({world_T_target});
-  ServingBranches serving;
-  serving.obstacle = "out of reach";
-  for (const env::JointVector& q : env::ToolInverseKinematics(*scene_, world_T_start)) {
-    const std::string obstacle = Starts(q, world_T_target);
-    if (obstacle.empty()) {
-      serving.q_rad.push_back(q);
-    } else {
-      serving.obstacle = obstacle;
-    }
-  }
-  if (!serving.q_rad.empty()) serving.obstacle.clear();
-  return serving;
+  return Serving(env::ToolInverseKinematics(*scene_, world_T_start),
+                 [&](const env::JointVector& q) { return Starts(q, world_T_target); });
 }
 
 planner::TransferPlan PlanToBranches(env::TransferChecker& checker, const env::Scene& scene,
