@@ -11,13 +11,13 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "core/error.h"
 #include "env/contact_map_builder.h"
 #include "env/fingerprint.h"
+#include "tests/workflow/assembly_document.h"
 #include "workflow/assembly_builds.h"
 
 namespace feeler::workflow {
@@ -26,20 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-json Shipped(const std::string& name) {
-  std::ifstream file(std::string(FEELER_SOURCE_DIR) + "/models/assemblies/" + name + ".json");
-  return json::parse(file);
-}
-
-Assembly Load(const json& document) {
-  const fs::path file = fs::path(testing::TempDir()) / "assembly_to_build.json";
-  std::ofstream(file) << document.dump();
-  return LoadAssembly(file.string());
-}
-
 /// The first insertions of the crane.
 json Beginning(std::size_t insertions) {
-  json crane = Shipped("crane");
+  json crane = ShippedAssembly("crane");
   while (crane["insertions"].size() > insertions) {
     crane["insertions"].erase(crane["insertions"].size() - 1);
     crane["parts"].erase(crane["parts"].size() - 1);
@@ -49,7 +38,7 @@ json Beginning(std::size_t insertions) {
 
 std::string CheckError(const json& document) {
   try {
-    CheckAssembly(Load(document));
+    CheckAssembly(LoadAssemblyText(document.dump()));
   } catch (const InputError& error) {
     return error.what();
   }
@@ -128,7 +117,7 @@ class AssemblyBuild : public testing::Test {
 };
 
 TEST_F(AssemblyBuild, EndsCompleteAndAgainTheSame) {
-  const Assembly assembly = Load(Beginning(1));
+  const Assembly assembly = LoadAssemblyText(Beginning(1).dump());
   const AssemblyPlan plan = CheckAssembly(assembly);
   AssemblyOptions options;
   options.seed = 4;
@@ -147,7 +136,7 @@ TEST_F(AssemblyBuild, EndsCompleteAndAgainTheSame) {
 }
 
 TEST_F(AssemblyBuild, PlansOnlineWhatNoDatabaseHolds) {
-  const Assembly assembly = Load(Beginning(1));
+  const Assembly assembly = LoadAssemblyText(Beginning(1).dump());
   AssemblyTasks tasks = *tasks_;
   tasks["pipe-into-elbow"].online = std::make_shared<execution::OnlinePlanner>();
   const AssemblyRecord record = BuildAssembly(assembly, CheckAssembly(assembly), tasks, {});
@@ -157,7 +146,7 @@ TEST_F(AssemblyBuild, PlansOnlineWhatNoDatabaseHolds) {
 }
 
 TEST(AssemblyDatabases, AreThoseOfItsTasks) {
-  const Assembly assembly = Load(Beginning(2));
+  const Assembly assembly = LoadAssemblyText(Beginning(2).dump());
   const auto database = [](const std::string& name, const std::string& task, const std::string& fingerprint) {
     const std::string path = (fs::path(testing::TempDir()) / name).string();
     fs::remove(path);
@@ -189,7 +178,7 @@ TEST(AssemblyDatabases, AreThoseOfItsTasks) {
 }
 
 TEST_F(AssemblyBuild, ErrorsCarryOver) {
-  const Assembly assembly = Load(Beginning(2));
+  const Assembly assembly = LoadAssemblyText(Beginning(2).dump());
   AssemblyOptions options;
   options.seed = 3;
   const AssemblyRecord plain = Build(assembly, options);
@@ -213,7 +202,7 @@ TEST_F(AssemblyBuild, ErrorsCarryOver) {
 }
 
 TEST_F(AssemblyBuild, StopsWhereAnInsertionCannotSucceed) {
-  const Assembly assembly = Load(Beginning(2));
+  const Assembly assembly = LoadAssemblyText(Beginning(2).dump());
   AssemblyOptions options;
   options.ladder = false;
   const AssemblyPlan plan = CheckAssembly(assembly);
@@ -238,7 +227,7 @@ TEST_F(AssemblyBuild, StopsWhereAnInsertionCannotSucceed) {
 }
 
 TEST_F(AssemblyBuild, AnEstimateFarFromTheTruthEndsItAfterASecondOne) {
-  const Assembly assembly = Load(Beginning(1));
+  const Assembly assembly = LoadAssemblyText(Beginning(1).dump());
   AssemblyOptions options;
   options.disturb_estimate = [](std::size_t, const Pose& pose) {
     return Pose(Eigen::Translation3d(0.0, 0.03, 0.0) * pose);

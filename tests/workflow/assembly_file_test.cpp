@@ -8,8 +8,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
@@ -17,29 +15,18 @@
 
 #include "core/error.h"
 #include "env/task_file.h"
+#include "tests/workflow/assembly_document.h"
 #include "workflow/assembly.h"
 
 namespace feeler::workflow {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
-
-json Shipped(const std::string& name) {
-  std::ifstream file(std::string(FEELER_SOURCE_DIR) + "/models/assemblies/" + name + ".json");
-  return json::parse(file);
-}
-
-Assembly Load(const std::string& text) {
-  const fs::path file = fs::path(testing::TempDir()) / "assembly_under_test.json";
-  std::ofstream(file) << text;
-  return LoadAssembly(file.string());
-}
 
 /// The one line that loading this ends with.
 std::string ErrorOf(const std::string& text) {
   try {
-    Load(text);
+    LoadAssemblyText(text);
   } catch (const InputError& error) {
     const std::string line = error.what();
     EXPECT_EQ(line.find('\n'), std::string::npos) << line;
@@ -52,7 +39,7 @@ std::string ErrorOf(const std::string& text) {
 
 /// The shipped crane with a value changed; null: removed.
 std::string ErrorWith(const char* pointer, const json& value) {
-  json crane = Shipped("crane");
+  json crane = ShippedAssembly("crane");
   const json::json_pointer place(pointer);
   if (value.is_null()) {
     crane[place.parent_pointer()].erase(place.back());
@@ -68,7 +55,7 @@ void ExpectNamed(const std::string& error, const std::string& where, const std::
 }
 
 TEST(AssemblyFile, EveryFaultIsNamedWithItsPlace) {
-  EXPECT_EQ(ErrorOf(Shipped("crane").dump()), "accepted");
+  EXPECT_EQ(ErrorOf(ShippedAssembly("crane").dump()), "accepted");
   EXPECT_NE(ErrorOf("{ \"kit\": "), "accepted");
   EXPECT_NE(ErrorOf("[1, 2]"), "accepted");
   ExpectNamed(ErrorWith("/kit", json()), "'kit'", "missing");
@@ -92,7 +79,7 @@ TEST(AssemblyFile, EveryFaultIsNamedWithItsPlace) {
   ExpectNamed(ErrorWith("/insertions/2/into", "nothing"), "insertions[2].into", "nothing");
   ExpectNamed(ErrorWith("/insertions/2/into", json()), "insertions[2]", "'into'");
   ExpectNamed(ErrorWith("/insertions/2/port", "top"), "insertions[2].port", "top");
-  json early = Shipped("crane");
+  json early = ShippedAssembly("crane");
   early["insertions"][1]["into"] = "jib";
   early["insertions"][3]["into"] = "mast";
   ExpectNamed(ErrorOf(early.dump()), "insertions[1].into", "cycle");
@@ -101,21 +88,21 @@ TEST(AssemblyFile, EveryFaultIsNamedWithItsPlace) {
   early["insertions"][0]["into"] = "tip";
   early["insertions"][0]["port"] = "side";
   ExpectNamed(ErrorOf(early.dump()), "insertions[0].into", "cycle");
-  json late = Shipped("crane");
+  json late = ShippedAssembly("crane");
   std::swap(late["insertions"][1], late["insertions"][2]);
   ExpectNamed(ErrorOf(late.dump()), "insertions[1].into", "'head' does not stand yet");
-  json twice = Shipped("crane");
+  json twice = ShippedAssembly("crane");
   twice["insertions"][2]["into"] = "base";
   twice["insertions"][2]["port"] = "mouth";
   ExpectNamed(ErrorOf(twice.dump()), "insertions[2].port", "used already");
-  json wrong_port = Shipped("crane");
+  json wrong_port = ShippedAssembly("crane");
   wrong_port["insertions"][2]["into"] = "mast";
   wrong_port["insertions"][2]["port"] = "end";
   ExpectNamed(ErrorOf(wrong_port.dump()), "insertions[2].port", "elbow-onto-pipe");
-  json never = Shipped("crane");
+  json never = ShippedAssembly("crane");
   never["insertions"].erase(3);
   ExpectNamed(ErrorOf(never.dump()), "parts", "'tip' is never inserted");
-  json cycle = Shipped("crane");
+  json cycle = ShippedAssembly("crane");
   cycle["insertions"][0]["into"] = "tip";
   cycle["insertions"][0]["port"] = "side";
   ExpectNamed(ErrorOf(cycle.dump()), "insertions[0].into", "cycle");
@@ -146,11 +133,11 @@ TEST(AssemblyFile, PosesFollowFromThePorts) {
 }
 
 TEST(AssemblyFile, AFixtureMovesAllThatHangsOnIt) {
-  json moved = Shipped("crane");
+  json moved = ShippedAssembly("crane");
   moved["fixtures"][0]["position_m"] = {0.55, -0.1, 0.2};
   moved["fixtures"][0]["yaw_deg"] = 30;
   const std::vector<Pose> before = NominalPoses(LoadAssembly("crane"));
-  const std::vector<Pose> after = NominalPoses(Load(moved.dump()));
+  const std::vector<Pose> after = NominalPoses(LoadAssemblyText(moved.dump()));
   const Pose motion = after[0] * before[0].inverse();
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_TRUE(after[i].isApprox(motion * before[i], 1e-9)) << i;
 }
