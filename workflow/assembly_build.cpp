@@ -306,9 +306,7 @@ class Builder {
                             stage.robot().statistics().peak_force_n, stage.robot().Time() - started_s);
     if (attempt.execution.world_T_estimate) {
       attempt.error = PoseErrorOf(task, step.world_T_true, *attempt.execution.world_T_estimate);
-      attempt.localized = attempt.error->largest_lateral_m <= task.tolerance.lateral_m &&
-                          attempt.error->vertical_m <= task.tolerance.vertical_m &&
-                          attempt.error->angle_rad <= task.tolerance.angle_rad;
+      attempt.localized = WithinTolerance(task.tolerance, *attempt.error);
     }
     attempt.depth_m = verdict.depth_m;
     attempt.lateral_m = verdict.lateral_m;

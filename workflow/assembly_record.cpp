@@ -95,13 +95,4 @@ std::vector<ordered_json> ToJsonLines(const Assembly& assembly, const AssemblyRe
   return lines;
 }
 
-PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose) {
-  const Pose difference = reference.inverse() * pose;
-  const int along = AxisOf(task.insertion);
-  Eigen::Vector3d across = difference.translation();
-  across[along] = 0.0;
-  return {across.norm(), across.cwiseAbs().maxCoeff(), std::abs(difference.translation()[along]),
-          InsertionAngle(task, difference.linear())};
-}
-
 }  // namespace feeler::workflow

@@ -10,7 +10,7 @@
 #include "execution/execution_record.h"
 #include "planner/preprocess/problem_family.h"
 #include "workflow/assembly.h"
-#include "workflow/episode_record.h"
+#include "workflow/pose_error.h"
 
 namespace feeler::workflow {
 
@@ -61,8 +61,5 @@ struct AssemblyRecord {
 /// The record as JSON Lines: one object a step, then one with the verdict. Measured times stand under `timing`; all
 /// else is a function of assembly, databases and seed.
 std::vector<nlohmann::ordered_json> ToJsonLines(const Assembly& assembly, const AssemblyRecord& record);
-
-/// How far `pose` is from `reference`, along and across the insertion of the task.
-PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose);
 
 }  // namespace feeler::workflow

@@ -12,20 +12,6 @@
 namespace feeler::workflow {
 namespace {
 
-PoseError ErrorOf(const Task& task, const Pose& world_T_true, const Pose& world_T_estimate) {
-  const Pose difference = world_T_true.inverse() * world_T_estimate;
-  const int along = AxisOf(task.insertion);
-  Eigen::Vector3d across = difference.translation();
-  across[along] = 0.0;
-  return {across.norm(), across.cwiseAbs().maxCoeff(), std::abs(difference.translation()[along]),
-          InsertionAngle(task, difference.linear())};
-}
-
-bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
-  return error.largest_lateral_m <= tolerance.lateral_m && error.vertical_m <= tolerance.vertical_m &&
-         error.angle_rad <= tolerance.angle_rad;
-}
-
 /// While it lives the recorder sees every physics step.
 class Watched {
  public:
@@ -166,7 +152,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   // The score: from here on the truth may be looked at.
   const env::InsertionVerdict verdict = environment_->Judge();
   if (record.execution.world_T_estimate) {
-    record.error = ErrorOf(task, draw.world_T_true, *record.execution.world_T_estimate);
+    record.error = PoseErrorOf(task, draw.world_T_true, *record.execution.world_T_estimate);
     record.localized = WithinTolerance(task.tolerance, *record.error);
   }
   record.inserted = verdict.inserted;

@@ -8,17 +8,10 @@
 #include "execution/execution_record.h"
 #include "planner/preprocess/problem_family.h"
 #include "workflow/episode_draw.h"
+#include "workflow/pose_error.h"
 #include "workflow/replay.h"
 
 namespace feeler::workflow {
-
-/// Final estimate against the truth.
-struct PoseError {
-  double lateral_m = 0.0;          ///< across the insertion axis
-  double largest_lateral_m = 0.0;  ///< along the worse of the two axes across it: what the tolerance is about
-  double vertical_m = 0.0;         ///< along the insertion axis
-  double angle_rad = 0.0;
-};
 
 /// One seeded attempt, scored. Everything but `timing` is a pure function of task, policy, settings, seed and episode.
 struct EpisodeRecord {
