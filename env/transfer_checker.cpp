@@ -34,6 +34,8 @@ JointVector Reach(const Scene& scene) {
   return reach;
 }
 
+}  // namespace
+
 planner::JointBounds JointLimits(const Scene& scene) {
   planner::JointBounds limits{JointVector::Zero(), JointVector::Zero()};
   for (int i = 0; i < kJointCount; ++i) {
@@ -44,20 +46,18 @@ planner::JointBounds JointLimits(const Scene& scene) {
   return limits;
 }
 
-/// The same place of all links, each joint as near to `start` as whole turns and its limits allow.
-Eigen::VectorXd NearestTwin(const Eigen::VectorXd& q, const JointVector& start, const planner::JointBounds& limits) {
+JointVector NearestTwin(const JointVector& q_rad, const JointVector& start_rad, const planner::JointBounds& bounds,
+                        double margin_rad) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
-  Eigen::VectorXd twin = q;
+  JointVector twin = q_rad;
   for (int i = 0; i < kJointCount; ++i) {
-    for (const double other : {q[i] - kTurn, q[i] + kTurn}) {
-      const bool allowed = other >= limits.lower_rad[i] && other <= limits.upper_rad[i];
-      if (allowed && std::abs(other - start[i]) < std::abs(twin[i] - start[i])) twin[i] = other;
+    for (const double other : {q_rad[i] - kTurn, q_rad[i] + kTurn}) {
+      const bool allowed = other >= bounds.lower_rad[i] + margin_rad && other <= bounds.upper_rad[i] - margin_rad;
+      if (allowed && std::abs(other - start_rad[i]) < std::abs(twin[i] - start_rad[i])) twin[i] = other;
     }
   }
   return twin;
 }
-
-}  // namespace
 
 std::string NameOfGeom(const mjModel& model, int geom) {
   const char* name = mj_id2name(&model, mjOBJ_GEOM, geom);
@@ -130,7 +130,7 @@ planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene,
   if (plan.status == planner::TransferStatus::kNotFound && settings.far_iterations > 0) {
     const int branches = static_cast<int>(goals.size());
     for (int i = 0; i < branches; ++i) {
-      goals.push_back(NearestTwin(goals[static_cast<std::size_t>(i)], start_rad, limits));
+      goals.emplace_back(NearestTwin(goals[static_cast<std::size_t>(i)], start_rad, limits));
     }
     options.iterations_all_goals = settings.far_iterations;
     const int checks = plan.checks;

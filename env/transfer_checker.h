@@ -45,6 +45,13 @@ class TransferChecker {
   JointVector reach_m_;
 };
 
+/// Of the arm, as its model has them.
+planner::JointBounds JointLimits(const Scene& scene);
+
+/// The same place of all links, each joint as near to `start_rad` as whole turns and the bounds, less a margin, allow.
+JointVector NearestTwin(const JointVector& q_rad, const JointVector& start_rad, const planner::JointBounds& bounds,
+                        double margin_rad = 0.0);
+
 struct TransferSettings {
   double clearance_m = 0.004;
   std::uint64_t seed = 0;

@@ -66,32 +66,6 @@ ServingBranches Serving(const std::vector<env::JointVector>& branches, const Obs
   return serving;
 }
 
-planner::JointBounds JointLimits(const env::Scene& scene) {
-  planner::JointBounds limits{env::JointVector::Zero(), env::JointVector::Zero()};
-  for (int i = 0; i < env::kJointCount; ++i) {
-    const double* range = scene.model->jnt_range + 2 * scene.joint[static_cast<std::size_t>(i)];
-    limits.lower_rad[i] = range[0];
-    limits.upper_rad[i] = range[1];
-  }
-  return limits;
-}
-
-/// The same place of all links, each joint as near to `start` as whole turns and the bounds allow, with room for the
-/// straight motions that follow.
-Eigen::VectorXd NearestTwin(const env::JointVector& q, const env::JointVector& start,
-                            const planner::JointBounds& bounds) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  Eigen::VectorXd twin = q;
-  for (int i = 0; i < env::kJointCount; ++i) {
-    for (const double other : {q[i] - kTurn, q[i] + kTurn}) {
-      const bool allowed =
-          other >= bounds.lower_rad[i] + kMostJointTurn_rad && other <= bounds.upper_rad[i] - kMostJointTurn_rad;
-      if (allowed && std::abs(other - start[i]) < std::abs(twin[i] - start[i])) twin[i] = other;
-    }
-  }
-  return twin;
-}
-
 }  // namespace
 
 StageReach::StageReach(std::shared_ptr<const env::Scene> scene)
@@ -188,19 +162,22 @@ planner::TransferPlan PlanToBranches(env::TransferChecker& checker, const env::S
   // As env::PlanTransfer: half the spacing stays within the clearance, and so does half of it again.
   options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
   const planner::ValidityFunction free = [&](const Eigen::VectorXd& q) { return checker.Free(q); };
-  const planner::JointBounds limits = JointLimits(scene);
+  const planner::JointBounds limits = env::JointLimits(scene);
   planner::JointBounds near;
   const env::JointVector half = env::JointVector::Constant(std::numbers::pi);
   near.lower_rad = env::JointVector(-half).cwiseMin(start_rad).cwiseMax(limits.lower_rad);
   near.upper_rad = half.cwiseMax(start_rad).cwiseMin(limits.upper_rad);
   std::vector<Eigen::VectorXd> goals(branches.begin(), branches.end());
   for (const env::JointVector& q : branches) {
-    Eigen::VectorXd twin = NearestTwin(q, start_rad, near);
+    // With room for the straight motions that follow.
+    Eigen::VectorXd twin = env::NearestTwin(q, start_rad, near, kMostJointTurn_rad);
     if (twin != goals[static_cast<std::size_t>(&q - branches.data())]) goals.push_back(std::move(twin));
   }
   planner::TransferPlan plan = planner::TransferPlanner(near, free, options).Plan(start_rad, goals);
   if (plan.status == planner::TransferStatus::kNotFound) {
-    for (const env::JointVector& q : branches) goals.push_back(NearestTwin(q, start_rad, limits));
+    for (const env::JointVector& q : branches) {
+      goals.emplace_back(env::NearestTwin(q, start_rad, limits, kMostJointTurn_rad));
+    }
     options.iterations_all_goals = kFarIterations;
     plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
   }
