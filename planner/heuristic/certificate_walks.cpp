@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/direction.h"
+#include "planner/heuristic/equal_steps.h"
 
 namespace feeler::planner {
 namespace {
@@ -103,26 +104,13 @@ void FillCertificates(const CertificateWalks& walks, int bits, std::uint16_t* pl
       cost[probe.from] = value;
       seeds.emplace_back(value, probe.from);
     }
-    std::ranges::sort(seeds);
-    // Free steps cost the same, so relaxed cells queue up in order of cost: merging the queue with the seeds is
-    // Dijkstra's algorithm.
-    queue.clear();
-    std::size_t next_seed = 0;
-    std::size_t next_queued = 0;
-    while (next_seed < seeds.size() || next_queued < queue.size()) {
-      const bool take_seed = next_queued == queue.size() ||
-                             (next_seed < seeds.size() && seeds[next_seed].first <= queue[next_queued].first);
-      const auto [value, cell] = take_seed ? seeds[next_seed++] : queue[next_queued++];
-      if (value != cost[cell]) continue;
+    SpreadByEqualSteps(seeds, walks.step_cost, cost, queue, [&](std::uint32_t cell, auto relax) {
       for (const Direction d : kDirections) {
         if ((walks.enters[cell] >> IndexOf(d) & 1) == 0) continue;
         const std::int64_t stride = walks.strides[static_cast<std::size_t>(AxisOf(d))];
-        const auto before = static_cast<std::uint32_t>(static_cast<std::int64_t>(cell) - SignOf(d) * stride);
-        if (value + walks.step_cost >= cost[before]) continue;
-        cost[before] = value + walks.step_cost;
-        queue.emplace_back(cost[before], before);
+        relax(static_cast<std::uint32_t>(static_cast<std::int64_t>(cell) - SignOf(d) * stride));
       }
-    }
+    });
     std::uint16_t* const plane = planes + mask * cells;
     for (std::size_t i = 0; i < cells; ++i) {
       plane[i] = cost[i] == kInfinite

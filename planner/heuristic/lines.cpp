@@ -7,6 +7,8 @@
 #include <tuple>
 #include <utility>
 
+#include "planner/heuristic/equal_steps.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -135,26 +137,14 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
         seeds.emplace_back(value, static_cast<std::uint32_t>(at));
       }
     }
-    std::ranges::sort(seeds);
-    queue.clear();
-    std::size_t next_seed = 0;
-    std::size_t next_queued = 0;
-    while (next_seed < seeds.size() || next_queued < queue.size()) {
-      const bool take_seed = next_queued == queue.size() ||
-                             (next_seed < seeds.size() && seeds[next_seed].first <= queue[next_queued].first);
-      const auto [value, at] = take_seed ? seeds[next_seed++] : queue[next_queued++];
-      if (value != cost[at]) continue;
+    SpreadByEqualSteps(seeds, step_cost, cost, queue, [&](std::uint32_t at, auto relax) {
       for (const Direction d : kDirections) {
         if ((leads[at] >> IndexOf(Opposite(d)) & 1) == 0) continue;
         const auto before = static_cast<std::uint32_t>(static_cast<std::int64_t>(at) -
                                                        SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
-        if ((inside[before] & whole) != 0 || (blocked[static_cast<std::size_t>(IndexOf(d))][before] & whole) != 0)
-          continue;
-        if (value + step_cost >= cost[before]) continue;
-        cost[before] = value + step_cost;
-        queue.emplace_back(cost[before], before);
+        if (((inside[before] | blocked[static_cast<std::size_t>(IndexOf(d))][before]) & whole) == 0) relax(before);
       }
-    }
+    });
     for (std::size_t i = 0; i < grid.cells; ++i) {
       plane[i] = cost[i] == kInfinite ? kUnreachable
                                       : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kUnreachable - 1));

@@ -28,7 +28,8 @@ class BoundedSearch {
  public:
   using Belief = std::uint32_t;
 
-  BoundedSearch(Model& model, Incumbent& incumbent, double gap) : model_(model), incumbent_(incumbent), gap_(gap) {}
+  BoundedSearch(Model& model, Incumbent& incumbent, double gap, double inflation = 1.0)
+      : model_(model), incumbent_(incumbent), gap_(gap), inflation_(inflation) {}
 
   /// From `start` (which the incumbent must have solved) until the gap is closed or `stop(expansions)` says why not to
   /// go on.
@@ -67,32 +68,46 @@ class BoundedSearch {
   struct State {
     double lower = -1.0;  ///< negative: not met yet
     double upper = kInfinity;
+    double guess = 0.0;
     std::int32_t action = -1;
   };
 
   State& Node(Belief b) {
     if (b >= nodes_.size()) nodes_.resize(std::max<std::size_t>(model_.size(), b + std::size_t{1}));
     State& node = nodes_[b];
-    if (node.lower < 0.0) node.lower = model_.Heuristic(b);
+    if (node.lower < 0.0) {
+      node.lower = model_.Heuristic(b);
+      node.guess = inflation_ * node.lower;
+    }
     return node;
   }
   bool Closed(Belief b) { return Upper(b) <= gap_ * Lower(b) * (1.0 + 1e-10) + 1e-10; }
 
-  /// Bellman updates of both bounds; returns the action of least L.
+  bool FollowsGuess() const { return inflation_ > 1.0 && trials_ % 2 != 0; }
+
+  /// Bellman updates of the bounds and the guess; returns the action to follow.
   int Update(Belief b) {
     if (!model_.expanded(b)) ++expansions_;
     double least = kInfinity;
     double best = Upper(b);
+    double least_guess = kInfinity;
     int least_action = -1;
     int best_action = -1;
+    int guess_action = -1;
     int index = 0;
     for (const auto& action : model_.Actions(b)) {
       double lower = action.cost;
       double upper = action.cost;
+      double guess = action.cost;
       model_.ForEachSuccessor(action, [&](Belief next) {
         lower += Lower(next);
         upper += Upper(next);
+        guess += Node(next).guess;
       });
+      if (guess_action < 0 || guess < least_guess) {
+        least_guess = guess;
+        guess_action = index;
+      }
       if (least_action < 0 || lower <= least * (1.0 + 1e-12)) {
         least = std::min(least, lower);
         least_action = index;
@@ -105,11 +120,12 @@ class BoundedSearch {
     }
     State& node = Node(b);
     node.lower = std::max(node.lower, least);
+    node.guess = std::max(node.lower, least_guess);
     if (best_action >= 0) {
       node.upper = best;
       node.action = best_action;
     }
-    return least_action;
+    return FollowsGuess() ? guess_action : least_action;
   }
 
   Belief WidestSuccessor(Belief b, int action) {
@@ -131,6 +147,7 @@ class BoundedSearch {
   Model& model_;
   Incumbent& incumbent_;
   double gap_;
+  double inflation_;
   std::vector<State> nodes_;
   std::int64_t expansions_ = 0;
   std::int64_t trials_ = 0;

@@ -20,6 +20,9 @@ namespace feeler::planner {
 /// move that splits the belief best, judged by its cost plus the heuristic values of its outcomes; then the same from
 /// each outcome. It always ends, because every such step leaves fewer hypotheses. Used as an incumbent where RTDP-Bel
 /// takes long. Same interface as RtdpBel, so that BoundedSearch can start from either.
+///
+/// It may be run again with the heuristic inflated, which judges splits otherwise (a lower bound makes early splits
+/// that leave much to do look cheap): of each belief the best policy found in any run is kept.
 template <BeliefModel Model>
 class GreedyCompletion {
  public:
@@ -32,11 +35,14 @@ class GreedyCompletion {
   /// Finds a policy from `start`; kUnlocalizable if there is none by the heuristic. Nothing is kept of beliefs in work
   /// when `stop(expansions)` interrupts.
   template <class Stop>
-  std::optional<SolverStatus> Run(Belief start, Stop stop) {
+  std::optional<SolverStatus> Run(Belief start, Stop stop, double inflation = 1.0) {
+    ++run_;
+    inflation_ = inflation;
+    plans_.clear();
     std::vector<Belief> open = {start};
     while (!open.empty()) {
       const Belief b = open.back();
-      if (Solved(b)) {
+      if (Settled(b)) {
         open.pop_back();
         continue;
       }
@@ -47,7 +53,7 @@ class GreedyCompletion {
       bool ready = true;
       model_.ForEachSuccessor(model_.Actions(plan.path.back().first)[static_cast<std::size_t>(plan.path.back().second)],
                               [&](Belief next) {
-                                if (Solved(next)) return;
+                                if (Settled(next)) return;
                                 ready = false;
                                 open.push_back(next);
                               });
@@ -69,6 +75,7 @@ class GreedyCompletion {
   struct State {
     double value = 0.0;
     std::int32_t action = -1;
+    std::int32_t run = 0;  ///< the last in which it was settled
   };
   /// Moves that show nothing and at last one that splits (or leads to a belief that is solved): belief and action.
   struct Plan {
@@ -82,15 +89,20 @@ class GreedyCompletion {
 
   void Settle(Belief b, int action) {
     if (b >= nodes_.size()) nodes_.resize(std::max<std::size_t>(model_.size(), b + std::size_t{1}));
-    if (nodes_[b].action >= 0) return;  // another plan came by since; its policy stands
+    if (Settled(b)) return;  // another plan came by since; its policy stands
     const auto& chosen = model_.Actions(b)[static_cast<std::size_t>(action)];
     double value = chosen.cost;
     model_.ForEachSuccessor(chosen, [&](Belief next) { value += nodes_[next].value; });
-    nodes_[b] = {value, action};
+    State& node = nodes_[b];
+    node.run = run_;
+    if (node.action >= 0 && node.value <= value) return;
+    node.value = value;
+    node.action = action;
   }
 
-  double Guess(Belief b) const { return estimate_ ? estimate_(b) : model_.Heuristic(b); }
-  double Estimate(Belief b) const { return Solved(b) ? nodes_[b].value : Guess(b); }
+  bool Settled(Belief b) const { return b < nodes_.size() && nodes_[b].run == run_; }
+  double Guess(Belief b) const { return inflation_ * (estimate_ ? estimate_(b) : model_.Heuristic(b)); }
+  double Estimate(Belief b) const { return Settled(b) ? nodes_[b].value : Guess(b); }
 
   template <class Stop>
   std::optional<SolverStatus> MakePlan(Belief start, Stop& stop) {
@@ -121,7 +133,7 @@ class GreedyCompletion {
           ++successors;
         });
         const bool splits = successors != 1 || model_.Weight(only) != model_.Weight(b);
-        if (splits || Solved(only)) {
+        if (splits || Settled(only)) {
           if (value < best) {
             best = value;
             last = {b, index};
@@ -152,6 +164,8 @@ class GreedyCompletion {
   std::vector<State> nodes_;
   std::unordered_map<Belief, Plan> plans_;
   std::int64_t expansions_ = 0;
+  std::int32_t run_ = 0;
+  double inflation_ = 1.0;
 };
 
 }  // namespace feeler::planner

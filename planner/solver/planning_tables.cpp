@@ -50,6 +50,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
     oriented_pairs_ = std::make_shared<OrientedPairs>(flags, costs);
     if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
       oriented_ = std::make_shared<OrientedCertificates>(problem, *flags, costs, jobs, options.on_tables);
+      oriented_lines_ = std::make_shared<OrientedLines>(problem, *flags, costs, jobs, options.on_tables);
     }
   }
   switch (options.heuristic) {
@@ -83,7 +84,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
                                                                const HypothesisSets& sets) const {
-  if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_);
+  if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_, oriented_lines_);
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   if (lines_ && oriented_pairs_) return std::make_unique<LineHeuristic>(problem, sets, lines_, oriented_pairs_);
   if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);

@@ -43,6 +43,7 @@ class PlanningTables {
   std::shared_ptr<const PairCertificates> pairs_;
   std::shared_ptr<const OrientedCertificates> oriented_;  ///< with their pairs, where the target has orientations
   std::shared_ptr<const OrientedPairs> oriented_pairs_;
+  std::shared_ptr<const OrientedLines> oriented_lines_;
   std::shared_ptr<const CuboidTable> cuboids_;
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;

@@ -1,6 +1,7 @@
 #include "planner/solver/solve.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -26,6 +27,10 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Up to so many hypotheses the greedy policy is tried beside the one for openings.
 constexpr std::uint32_t kGreedyBesideOpen = 256;
+/// Of the heuristic where hypotheses have orientations, which makes it loose: in further greedy policies (which one
+/// serves best differs from problem to problem) and in the guess of BoundedSearch.
+constexpr std::array kInflations = {1.2, 1.4, 1.7, 2.0};
+constexpr double kGuessInflation = 1.3;
 
 /// epsilon * heur, times the weight of the belief.
 struct InflatedHeuristic {
@@ -128,6 +133,7 @@ class Attempt {
       if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideOpen || !open.Solved(start_)) Complete(greedy);
       if (open.Solved(start_)) CloseGap(open, 0);
     } else if (Complete(greedy)) {
+      if (Oriented()) Improve(greedy);
       CloseGap(greedy, 0);
     }
   }
@@ -147,6 +153,17 @@ class Attempt {
     return false;
   }
 
+  bool Oriented() const { return graph_.problem().map->orientations() > 1; }
+
+  /// Further policies while the gap is open: with orientations the first may be far off.
+  void Improve(GreedyCompletion<BeliefGraph>& greedy) {
+    for (const double inflation : kInflations) {
+      if (greedy.Value(start_) <= options_.gap * result_.lower_bound * weight_) return;
+      greedy.Run(
+          start_, [this](std::int64_t expansions) { return Stop(expansions); }, inflation);
+    }
+  }
+
   /// The problem on the map whose dead ends are filled; none where there are none, or the tool is in one.
   std::optional<Problem> WithoutDeadEnds() {
     const Problem& problem = graph_.problem();
@@ -161,7 +178,7 @@ class Attempt {
 
   template <class Incumbent>
   void CloseGap(Incumbent& incumbent, std::int64_t expansions_before) {
-    BoundedSearch search(graph_, incumbent, options_.gap);
+    BoundedSearch search(graph_, incumbent, options_.gap, Oriented() ? kGuessInflation : 1.0);
     const auto lower = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
     const auto why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
       const double upper = search.Upper(start_) / weight_;
