@@ -21,6 +21,8 @@ constexpr double kLeastTold = 0.25;
 constexpr int kMostContacts = 4;
 /// After a blocked path the tool comes out by this, in cells.
 constexpr double kComeOut = 2.0;
+/// Of a cell, in units of the time of a motion of one cell from rest to rest (see FindFreePath).
+constexpr double kTimeOfProbing = 0.5;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameWall = 0.2;
 
@@ -76,22 +78,23 @@ int ContactsWanted(const ExecutorOptions& options) {
 
 std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& map, const Eigen::Vector3d& displacement,
                                                    int axis, int orientation) {
-  ConfirmingTouch touch;
-  const auto suits = [&](const Cell& cell) {
+  const auto wall_from = [&](const Cell& cell) -> std::optional<Direction> {
     for (const int sign : {1, -1}) {
-      const Direction direction = MakeDirection(axis, sign);
-      if (IsBroadWall(map, cell, direction, orientation)) {
-        touch.direction = direction;
-        touch.travel_cells = map.Travel(cell, direction, orientation);
-        return true;
-      }
+      if (IsBroadWall(map, cell, MakeDirection(axis, sign), orientation)) return MakeDirection(axis, sign);
     }
-    return false;
+    return std::nullopt;
   };
-  const auto path = FindFreePath(map, NearestFree(map, displacement, orientation), suits, orientation);
+  const auto path = FindFreePath(
+      map, NearestFree(map, displacement, orientation),
+      [&](const Cell& cell) -> std::optional<double> {
+        const auto direction = wall_from(cell);
+        if (!direction) return std::nullopt;
+        return kTimeOfProbing * map.Travel(cell, *direction, orientation);
+      },
+      orientation);
   if (!path) return std::nullopt;
-  touch.path = *path;
-  return touch;
+  const Direction direction = *wall_from(path->back());
+  return ConfirmingTouch{*path, direction, map.Travel(path->back(), direction, orientation)};
 }
 
 bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,

@@ -20,9 +20,9 @@ struct ConfirmingTouch {
   double travel_cells = 0.0;  ///< predicted, from the last way point
 };
 
-/// The nearest broad wall across `axis`: one that is met at the same place from the eight neighbouring lines as well,
-/// so that an error across the axis does not matter. `displacement`: of the tool from the target, cells. Empty if the
-/// target has no such wall in reach.
+/// The broad wall across `axis` that is felt soonest: one that is met at the same place from the eight neighbouring
+/// lines as well, so that an error across the axis does not matter. `displacement`: of the tool from the target, cells.
+/// Empty if the target has no such wall in reach.
 std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& map, const Eigen::Vector3d& displacement,
                                                    int axis, int orientation);
 

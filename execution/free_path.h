@@ -13,12 +13,19 @@ namespace feeler::execution {
 /// beyond the half cell by which a displacement may be rounded.
 bool IsClear(const planner::ContactMap& map, const Cell& displacement, int orientation = 0);
 
-/// Shortest way of the tool through the free displacements around the target, in lattice steps, from `start` to the
-/// nearest displacement that satisfies `goal`, cut to the few corners between which straight lines stay clear (the
-/// first is `start`). Displacements that are free but not clear are crossed only where nothing else is left, as near a
-/// wall that was just touched. Searches the domain of the map grown by two cells, and `start`. Empty: there is no way.
-std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, const Cell& start,
-                                              const std::function<bool(const Cell&)>& goal, int orientation = 0);
+/// For a displacement that a path may end at, the time of what follows from there; empty where it may not end. In units
+/// of the time of a motion of one cell from rest to rest; short motions take time as the square root of their length.
+using PathGoal = std::function<std::optional<double>(const Cell&)>;
+PathGoal EndAt(const Cell& goal);
+
+/// A quick way of the tool through the free displacements around the target, from `start` to a goal; the tool comes to
+/// rest at each way point, and `start` is the first. Of the goals nearby (by lattice steps), each reached by the
+/// shortest lattice path with straight lines in place of its steps, or by way of one point only, whatever takes the
+/// least time. Lines stay clear. Displacements that are free but not clear are crossed only where nothing else is left,
+/// as near a wall that was just touched, which a line may leave at an angle. Searches the domain of the map grown by
+/// two cells, and `start`. Empty: there is no way.
+std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, const Cell& start, const PathGoal& goal,
+                                              int orientation = 0);
 
 /// The free displacement nearest to a continuous one (cells), within two cells; the nearest lattice point if none is.
 /// A tool beside a wall may round into it.

@@ -32,8 +32,7 @@ InsertionVerdict ApproachAndInsert(const Task& task, const planner::ContactMap& 
   }
   if (!gate) throw LostTrack("insertion: no free place in front of the opening");
   const Cell here = NearestFree(map, mover.position() - target, orientation);
-  auto path = FindFreePath(
-      map, here, [&](const Cell& cell) { return cell == *gate; }, orientation);
+  auto path = FindFreePath(map, here, EndAt(*gate), orientation);
   if (!path) throw LostTrack("insertion: no free way to the opening");
   if (path->size() > 1) path->pop_back();  // the last leg ends exactly in front of the opening, not at a lattice point
   if (!FollowPath(map, target, *path, "approach", mover, evidence)) {

@@ -65,9 +65,8 @@ std::optional<BroadWall> FindBroadWall(const planner::ContactMap& map, Direction
 std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vector3d& target, int orientation,
                                 const BroadWall& wall, int offset, double slack, const char* kind, Mover& mover) {
   const Cell goal = wall.middle + offset * UnitCell(MakeDirection(wall.along, 1));
-  const auto path = FindFreePath(
-      map, NearestFree(map, mover.position() - target, orientation), [&](const Cell& cell) { return cell == goal; },
-      orientation);
+  const auto path =
+      FindFreePath(map, NearestFree(map, mover.position() - target, orientation), EndAt(goal), orientation);
   if (!path) return std::nullopt;
   std::vector<Touch> ignored;
   if (!FollowPath(map, target, *path, "transfer", mover, ignored)) return std::nullopt;

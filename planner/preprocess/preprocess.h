@@ -32,15 +32,14 @@ struct FamilyTraits {
   bool orientations = false;  ///< the orientation of the target is uncertain
 };
 
-/// Problems of uncertain orientations up to this size are worth many times the expansions of larger ones.
+/// Problems of uncertain orientations up to this size are worth more expansions than larger ones.
 inline constexpr int kSmallOrientedHypotheses = 600;
 
 /// The options that a problem of so many hypotheses in a family is solved with: the certified solver without any limit
 /// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
-/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 6,000 above, where they stay open
-/// whatever is given. 500 where the map has openings: the first policy and the bound at the start are all there, and
-/// the search between them adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not
-/// to.
+/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 30,000 above, where many stay open. 500
+/// where the map has openings: the first policy and the bound at the start are all there, and the search between them
+/// adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
 SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
                                std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
 

@@ -24,7 +24,7 @@ TEST(FindFreePath, KeepsClearOfTheHousing) {
     };
     const Cell start = draw();
     const Cell goal = draw();
-    const auto path = FindFreePath(*map, start, [&](const Cell& c) { return c == goal; });
+    const auto path = FindFreePath(*map, start, EndAt(goal));
     ASSERT_TRUE(path.has_value());
     EXPECT_EQ(path->front(), start);
     EXPECT_EQ(path->back(), goal);
@@ -42,8 +42,7 @@ TEST(FindFreePath, KeepsClearOfTheHousing) {
 }
 
 TEST(FindFreePath, NoWayIntoAWall) {
-  EXPECT_FALSE(
-      FindFreePath(*HousingMap(), Cell(0, 0, 2), [](const Cell& c) { return c == Cell(0, 0, -5); }).has_value());
+  EXPECT_FALSE(FindFreePath(*HousingMap(), Cell(0, 0, 2), EndAt(Cell(0, 0, -5))).has_value());
 }
 
 }  // namespace
