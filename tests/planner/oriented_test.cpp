@@ -2,17 +2,23 @@
 // random problems of two to four orientations. Laws: heuristics are admissible, consistent and zero at goals; the
 // certified solver and RTDP-Bel keep their promises; hypotheses that differ in nothing but an orientation that cannot
 // be felt are reported; canonical translation is exact; the table over orientations agrees with the table for one; the
-// heuristic of canonical beliefs is that of the same beliefs in problem coordinates.
+// tables of lines are what optimal policies cost; further first policies only improve; the heuristic of canonical
+// beliefs is that of the same beliefs in problem coordinates.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "planner/belief/belief_graph.h"
 #include "planner/heuristic/certificate_table.h"
+#include "planner/heuristic/oriented_lines.h"
 #include "planner/preprocess/problem_family.h"
 #include "planner/solver/evaluate.h"
+#include "planner/solver/freeze_policy.h"
+#include "planner/solver/greedy_completion.h"
 #include "planner/solver/planning_tables.h"
 #include "tests/planner/oriented_problems.h"
 #include "tests/planner/synthetic_pipe.h"
@@ -173,6 +179,87 @@ TEST(Oriented, TheTableAgreesWithTheOneForOneOrientation) {
     const std::uint32_t with_way = value + (mask == 0 ? 0 : box.WayBack(at));
     ASSERT_EQ(with_way, one.Further(at, mask, 0)) << at.transpose() << " mask " << mask;
   }
+}
+
+TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
+  // Where only distance costs, the tables are exact: the cost of the policy that is found for a line alone, which no
+  // lower bound can be above and no policy below.
+  Task task = testing::MakePipeTask(4, 4);
+  task.workspace_m = Eigen::Vector3d(0.09, 0.08, 0.04);
+  const auto map = testing::MakePipeMap(task, 0.35);
+  const Problem whole = MakeCuboidProblem(task, map, {2, 2, 1, 4, 4});
+  const OrientedLines lines(whole, StepFlagsGrid(*map, Parallelism(1)),
+                            LowerStepCosts(task.cost, whole.move_lengths.back()), Parallelism(1), {});
+  SolverOptions options;
+  options.gap = 1.0;
+  const auto tables = BuildPlanningTables(whole, options, Parallelism(2));
+  RandomStream random(17, 0, "lines");
+  int compared = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const OrientedLines::Axis axis = trial % 2 == 0 ? OrientedLines::kYaw : OrientedLines::kPitch;
+    const int across = static_cast<int>(random.Index(4));
+    Problem problem = whole;
+    problem.hypotheses.clear();
+    unsigned subset = 0;
+    int line = -1;
+    for (int k = 0; k < 4; ++k) {
+      if (random.Index(3) == 0) continue;
+      const int orientation = axis == OrientedLines::kYaw ? k * whole.pitches + across : across * whole.pitches + k;
+      const OrientedLines::Place place = lines.PlaceOf(axis, orientation);
+      ASSERT_TRUE(line < 0 || line == place.line);
+      line = place.line;
+      subset |= 1U << place.bit;
+      problem.hypotheses.push_back({Cell::Zero(), orientation});
+    }
+    const auto count = static_cast<double>(problem.hypotheses.size());
+    if (count < 2) continue;
+    problem.start = whole.start + Cell(static_cast<int>(random.Index(9)) - 4, static_cast<int>(random.Index(9)) - 4,
+                                       static_cast<int>(random.Index(5)));
+    if (std::ranges::any_of(problem.hypotheses,
+                            [&](const Hypothesis& h) { return Blocked(problem, problem.start, h); })) {
+      continue;
+    }
+    const SolverResult result = Solve(problem, options, tables);
+    const OrientedBox& box = lines.box(line);
+    const std::uint16_t value = lines.Plane(line, subset)[box.Index(problem.start)];
+    if (!result.complete()) {
+      EXPECT_EQ(value, OrientedLines::kNone);
+      continue;
+    }
+    EXPECT_NEAR(value + count * box.WayBack(problem.start), count * result.expected_cost, 1e-6) << trial;
+    ++compared;
+  }
+  EXPECT_GT(compared, 20);
+}
+
+TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
+  const Task task = testing::MakePipeTask(3, 3);
+  const auto map = testing::MakePipeMap(task, 0.5);
+  const Problem problem = MakeCuboidProblem(task, map, {3, 3, 1, 3, 3});
+  const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
+  BeliefGraph graph(problem, tables.masks(), true);
+  const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+  graph.SetHeuristic(heuristic.get());
+  GreedyCompletion<BeliefGraph> greedy(graph);
+  const BeliefId start = graph.Start();
+  const auto never = [](std::int64_t) { return std::optional<SolverStatus>(); };
+  double before = std::numeric_limits<double>::infinity();
+  int improved = 0;
+  for (const double inflation : {1.0, 1.2, 1.4, 1.7, 2.0}) {
+    ASSERT_FALSE(greedy.Run(start, never, inflation).has_value());
+    const double value = greedy.Value(start);
+    ASSERT_LE(value, before);
+    improved += value < before ? 1 : 0;
+    before = value;
+    const Policy policy = FreezePolicy(graph, [&](BeliefId b) {
+      const BeliefAction& action = graph.Actions(b)[static_cast<std::size_t>(greedy.Action(b))];
+      return GuardedMove{action.direction, action.cells};
+    });
+    EXPECT_EQ(Evaluate(problem, policy).fault, "");
+    EXPECT_LE(policy.expected_cost, value / graph.Weight(start) + 1e-9)
+        << "each belief's best, whatever run it is from";
+  }
+  EXPECT_GT(improved, 0);
 }
 
 }  // namespace
