@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "core/error.h"
 
@@ -111,7 +112,7 @@ std::string TransferChecker::Collision(const JointVector& q_rad) {
 }
 
 planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
-                                   const Pose& world_T_tool, const TransferSettings& settings) {
+                                   const std::vector<JointVector>& goals_rad, const TransferSettings& settings) {
   planner::TransferOptions options = settings.search;
   options.seed = settings.seed;
   options.reach_m = checker.reach_m();
@@ -124,36 +125,38 @@ planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene,
   bounds.upper_rad = near.cwiseMax(start_rad).cwiseMin(limits.upper_rad);
   const planner::ValidityFunction free = [&](const Eigen::VectorXd& q) { return checker.Free(q); };
   const planner::TransferPlanner planner(bounds, free, options);
-  std::vector<Eigen::VectorXd> goals;
-  for (const JointVector& q : ToolInverseKinematics(scene, world_T_tool)) goals.emplace_back(q);
+  std::vector<Eigen::VectorXd> goals(goals_rad.begin(), goals_rad.end());
+  std::vector<int> goal_of(goals_rad.size());  // of those that are added
+  std::iota(goal_of.begin(), goal_of.end(), 0);
+  const auto add_twins = [&](const planner::JointBounds& within) {
+    for (std::size_t i = 0; i < goals_rad.size(); ++i) {
+      const JointVector twin = NearestTwin(goals_rad[i], start_rad, within, settings.twin_margin_rad);
+      if (std::ranges::find(goals, Eigen::VectorXd(twin)) != goals.end()) continue;
+      goals.emplace_back(twin);
+      goal_of.push_back(static_cast<int>(i));
+    }
+  };
+  add_twins(bounds);
   planner::TransferPlan plan = planner.Plan(start_rad, goals);
   if (plan.status == planner::TransferStatus::kNotFound && settings.far_iterations > 0) {
-    const int branches = static_cast<int>(goals.size());
-    for (int i = 0; i < branches; ++i) {
-      goals.emplace_back(NearestTwin(goals[static_cast<std::size_t>(i)], start_rad, limits));
-    }
+    add_twins(limits);
     options.iterations_all_goals = settings.far_iterations;
     const int checks = plan.checks;
     plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
     plan.checks += checks;
-    if (plan.goal >= branches) plan.goal -= branches;
   }
+  if (plan.goal >= 0) plan.goal = goal_of[static_cast<std::size_t>(plan.goal)];
   if (plan.status == planner::TransferStatus::kStartInvalid && planner.WithinBounds(start_rad)) {
     plan.reason += ": " + checker.Collision(start_rad);
   } else if (plan.status == planner::TransferStatus::kNoGoal && !goals.empty()) {
-    plan.reason += ": " + checker.Collision(goals.front());
+    plan.reason += ": " + checker.Collision(goals_rad.front());
   }
   return plan;
 }
 
-std::vector<Pose> TargetCandidates(const Pose& estimate, const Eigen::Vector3d& half_extents_m) {
-  std::vector<Pose> candidates{estimate};
-  if (half_extents_m.isZero()) return candidates;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d sign((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
-    candidates.push_back(estimate * Eigen::Translation3d(sign.cwiseProduct(half_extents_m)));
-  }
-  return candidates;
+planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
+                                   const Pose& world_T_tool, const TransferSettings& settings) {
+  return PlanTransfer(checker, scene, start_rad, ToolInverseKinematics(scene, world_T_tool), settings);
 }
 
 }  // namespace feeler::env

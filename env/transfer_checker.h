@@ -60,20 +60,21 @@ struct TransferSettings {
   /// count.
   double joint_bound_rad = 3.14159265358979323846;
   int far_iterations = 20000;       ///< effort of the search within the limits of the joints; 0: none
+  double twin_margin_rad = 0.0;     ///< goals a turn of some joints away stay this far within the bounds
   planner::TransferOptions search;  ///< seed, reach_m and check_spacing_m are set from the above
 };
 
-/// Plans a transfer of the tool to `world_T_tool`: all branches of the inverse kinematics are goals, and, where the
-/// limits of the joints count, their twins a turn of some joints away that are nearest to the start.
-/// Way points, where there are any, begin with `start_rad` and are straight in joint space.
+/// Plans a transfer of the arm to one of these configurations, or to the same place of all links nearest to the start,
+/// some joints a whole turn away. Way points, where there are any, begin with `start_rad` and are straight in joint
+/// space; `goal` of the plan is an index into `goals_rad`.
+planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
+                                   const std::vector<JointVector>& goals_rad, const TransferSettings& settings = {});
+
+/// The same with the tool at `world_T_tool`: all branches of the inverse kinematics are goals.
 planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene, const JointVector& start_rad,
                                    const Pose& world_T_tool, const TransferSettings& settings = {});
 
 /// A geom for people: its name, or that of its body.
 std::string NameOfGeom(const mjModel& model, int geom);
-
-/// The corners and the centre of the box in which the target may stand: candidates for SetTargetPoses.
-/// `half_extents_m` along the axes of `estimate`.
-std::vector<Pose> TargetCandidates(const Pose& estimate, const Eigen::Vector3d& half_extents_m);
 
 }  // namespace feeler::env

@@ -283,14 +283,11 @@ class Builder {
     FoundPolicy found = FindPolicy(of, problem, attempt.extents);
     attempt.policy_source = found.source;
 
-    Eigen::Vector3d half_m = Eigen::Vector3d::Zero();
-    for (const UncertainAxis& axis : task.axes) {
-      if (!axis.angular()) half_m[static_cast<int>(axis.kind)] = 0.5 * attempt.extents[axis.kind] * axis.resolution;
-    }
     step.reason = attempt.reason = "not begun";
     const Pose start = execution::StartPose(task, problem, attempt.world_T_estimate);
     stage.Transfer(start, stage.reach().AtStart(attempt.world_T_estimate, start),
-                   env::TargetCandidates(attempt.world_T_estimate, half_m), "carrying the part");
+                   env::TargetCandidates(task, attempt.world_T_estimate, AxisExtents(task, attempt.extents)),
+                   "carrying the part");
 
     execution::ExecutorOptions options;
     options.ladder = options_.ladder;

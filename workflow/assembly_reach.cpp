@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -19,7 +18,6 @@ constexpr double kMostJointTurn_rad = 1.2;
 constexpr double kMostTurn_rad_m = 12.0;
 /// A hair short of the end, where a part may stand on a floor.
 constexpr double kShort_m = 5e-4;
-constexpr int kFarIterations = 20000;
 
 /// Whether the tool can move along any direction without the joints having to race: far enough from a singularity.
 bool MovesFreely(const env::Scene& scene, const env::JointVector& q_rad) {
@@ -156,33 +154,10 @@ ServingBranches StageReach::AtStart(const Pose& world_T_target, const Pose& worl
 planner::TransferPlan PlanToBranches(env::TransferChecker& checker, const env::Scene& scene,
                                      const env::JointVector& start_rad, const std::vector<env::JointVector>& branches,
                                      std::uint64_t seed) {
-  planner::TransferOptions options;
-  options.seed = seed;
-  options.reach_m = checker.reach_m();
-  // As env::PlanTransfer: half the spacing stays within the clearance, and so does half of it again.
-  options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
-  const planner::ValidityFunction free = [&](const Eigen::VectorXd& q) { return checker.Free(q); };
-  const planner::JointBounds limits = env::JointLimits(scene);
-  planner::JointBounds near;
-  const env::JointVector half = env::JointVector::Constant(std::numbers::pi);
-  near.lower_rad = env::JointVector(-half).cwiseMin(start_rad).cwiseMax(limits.lower_rad);
-  near.upper_rad = half.cwiseMax(start_rad).cwiseMin(limits.upper_rad);
-  std::vector<Eigen::VectorXd> goals(branches.begin(), branches.end());
-  for (const env::JointVector& q : branches) {
-    // With room for the straight motions that follow.
-    Eigen::VectorXd twin = env::NearestTwin(q, start_rad, near, kMostJointTurn_rad);
-    if (twin != goals[static_cast<std::size_t>(&q - branches.data())]) goals.push_back(std::move(twin));
-  }
-  planner::TransferPlan plan = planner::TransferPlanner(near, free, options).Plan(start_rad, goals);
-  if (plan.status == planner::TransferStatus::kNotFound) {
-    for (const env::JointVector& q : branches) {
-      goals.emplace_back(env::NearestTwin(q, start_rad, limits, kMostJointTurn_rad));
-    }
-    options.iterations_all_goals = kFarIterations;
-    plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
-  }
-  if (plan.status == planner::TransferStatus::kStartInvalid) plan.reason += ": " + checker.Collision(start_rad);
-  return plan;
+  env::TransferSettings settings;
+  settings.seed = seed;
+  settings.twin_margin_rad = kMostJointTurn_rad;  // room for the straight motions that follow
+  return env::PlanTransfer(checker, scene, start_rad, branches, settings);
 }
 
 }  // namespace feeler::workflow

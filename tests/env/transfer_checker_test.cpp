@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "env/insertion_env.h"
 #include "planner/transfer/time_parametrization.h"
 
 namespace feeler::env {
@@ -177,7 +178,7 @@ TEST(Transfer, RespectsEveryPlaceTheTargetMayBe) {
     return false;
   };
   EXPECT_TRUE(any_free());
-  checker.SetTargetPoses(TargetCandidates(scene.task.world_T_target, Eigen::Vector3d(0.015, 0.015, 0.015)));
+  checker.SetTargetPoses(TargetCandidates(scene.task, scene.task.world_T_target, {15, 15, 15}));
   EXPECT_FALSE(any_free()) << "the target may stand 15 mm higher";
   // The start pose of a task is chosen so that it is free wherever the target may be.
   const TransferPlan plan = PlanTransfer(checker, scene, scene.home_q_rad, StartPose(scene));

@@ -184,10 +184,10 @@ TEST(Oriented, TheTableAgreesWithTheOneForOneOrientation) {
 TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
   // Where only distance costs, the tables are exact: the cost of the policy that is found for a line alone, which no
   // lower bound can be above and no policy below.
-  Task task = testing::MakePipeTask(4, 4);
-  task.workspace_m = Eigen::Vector3d(0.09, 0.08, 0.04);
+  Task task = testing::MakePipeTask(2, 4);
+  task.workspace_m = Eigen::Vector3d(0.07, 0.06, 0.03);
   const auto map = testing::MakePipeMap(task, 0.35);
-  const Problem whole = MakeCuboidProblem(task, map, {2, 2, 1, 4, 4});
+  const Problem whole = MakeCuboidProblem(task, map, {1, 1, 1, 4, 4});
   const OrientedLines lines(whole, StepFlagsGrid(*map, Parallelism(1)),
                             LowerStepCosts(task.cost, whole.move_lengths.back()), Parallelism(1), {});
   SolverOptions options;
@@ -235,7 +235,7 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
 TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
   const Task task = testing::MakePipeTask(3, 3);
   const auto map = testing::MakePipeMap(task, 0.5);
-  const Problem problem = MakeCuboidProblem(task, map, {3, 3, 1, 3, 3});
+  const Problem problem = MakeCuboidProblem(task, map, {3, 2, 1, 3, 3});
   const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
   BeliefGraph graph(problem, tables.masks(), true);
   const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
