@@ -78,6 +78,14 @@ std::optional<std::size_t> OrientedHeuristic::Nearest(std::size_t member) const 
   return nearest;
 }
 
+const OrientedPairs::Plane& OrientedHeuristic::PairPlane(const Member& one, const Member& other) {
+  const Cell offset = other.offset - one.offset;
+  std::shared_ptr<const OrientedPairs::Plane>& plane =
+      pair_planes_[{offset.x(), offset.y(), offset.z(), one.orientation, other.orientation}];
+  if (!plane) plane = pairs_->Get(offset, one.orientation, other.orientation);
+  return *plane;
+}
+
 /// Members that share a place, by place; within it by the lines that they are on.
 void OrientedHeuristic::FindGroups(Terms& terms) {
   std::vector<std::uint32_t> order(members_.size());
@@ -131,8 +139,7 @@ OrientedHeuristic::Terms OrientedHeuristic::Prepare(SetId set) {
     if (member.neighbours == 0) {
       const auto nearest = Nearest(i);
       if (!nearest) continue;
-      const OrientedPairs::Plane& plane =
-          pairs_->Get(members_[*nearest].offset - member.offset, member.orientation, members_[*nearest].orientation);
+      const OrientedPairs::Plane& plane = PairPlane(member, members_[*nearest]);
       runs_.push_back({plane.values.data(), &plane.box, member.offset, 1, index});
     } else if (table_ == nullptr) {
       continue;

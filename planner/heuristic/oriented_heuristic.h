@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -75,6 +77,7 @@ class OrientedHeuristic final : public BeliefHeuristic {
   void FindMembers(SetId set);
   void FindGroups(Terms& terms);
   std::optional<std::size_t> Nearest(std::size_t member) const;
+  const OrientedPairs::Plane& PairPlane(const Member& one, const Member& other);
   bool CostsOfMembers(const Terms& terms, const Cell& robot);
   std::optional<std::uint64_t> SumOverPlaces(const Terms& terms, const Cell& robot) const;
 
@@ -86,6 +89,7 @@ class OrientedHeuristic final : public BeliefHeuristic {
   Cell spread_;
   int pitches_;
   bool uniform_;
+  std::map<std::array<int, 5>, std::shared_ptr<const OrientedPairs::Plane>> pair_planes_;  ///< that runs point into
   std::vector<Terms> terms_of_;
   std::vector<Run> runs_;
   std::vector<double> weights_;  ///< of runs, unless the prior is uniform: each is one hypothesis then

@@ -11,16 +11,22 @@ OrientedPairs::OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const S
       unit_(costs.free),
       contact_units_(static_cast<std::uint8_t>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)))) {}
 
-const OrientedPairs::Plane& OrientedPairs::Get(const Cell& offset, int orientation, int other) const {
+std::shared_ptr<const OrientedPairs::Plane> OrientedPairs::Get(const Cell& offset, int orientation, int other) const {
   const std::array<int, 5> key = {offset.x(), offset.y(), offset.z(), orientation, other};
   {
     const std::lock_guard lock(mutex_);
     const auto at = planes_.find(key);
-    if (at != planes_.end()) return *at->second;
+    if (at != planes_.end()) return at->second;
   }
-  auto fresh = std::make_unique<const Plane>(Build(offset, orientation, other));
+  auto fresh = std::make_shared<const Plane>(Build(offset, orientation, other));
   const std::lock_guard lock(mutex_);
-  return *planes_.try_emplace(key, std::move(fresh)).first->second;
+  if (bytes_ + fresh->values.size() > kMostBytes) {
+    planes_.clear();
+    bytes_ = 0;
+  }
+  const auto [at, added] = planes_.try_emplace(key, std::move(fresh));
+  if (added) bytes_ += at->second->values.size();
+  return at->second;
 }
 
 OrientedPairs::Plane OrientedPairs::Build(const Cell& offset, int orientation, int other) const {
