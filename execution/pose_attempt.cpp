@@ -38,6 +38,8 @@ constexpr double kRoughly = 3.0;
 constexpr int kSamples = 12;  ///< of the poses that a fit leaves
 constexpr double kStandoff_m = 0.012;
 constexpr double kNearStandoff_m = 0.003;
+constexpr double kDrawOut_m_s = 0.05;
+constexpr double kDrawnOut = 1.0;  ///< cells short of where a tool was drawn to
 
 struct Knowledge {
   std::vector<PoseFit> fits;  ///< best first
@@ -268,6 +270,15 @@ class PoseAttempt {
     return false;
   }
 
+  /// Away from the target to `up`. A tool that has dipped into the mouth meets its walls on the way: it is drawn out
+  /// compliantly. False: it is held.
+  bool ComeUp(const Eigen::Vector3d& up, const char* kind) {
+    if (Go(up, kind)) return true;
+    mover_.Press({up}, kDrawOut_m_s, kind);
+    mover_.ZeroWrench();
+    return out_ * (up - mover_.position())[along_] < kDrawnOut;
+  }
+
   /// To the clear height, over the place, down to it.
   bool GoTo(const Eigen::Vector3d& place) {
     const double clear = Cells(Eigen::Vector3d::Constant(space_.clear_m))[along_];
@@ -277,7 +288,7 @@ class PoseAttempt {
     if (beside) {
       if (out_ * (clear - up[along_]) > 0.02) {
         up[along_] = clear;
-        if (!Go(up, "transfer")) return false;
+        if (!ComeUp(up, "transfer")) return false;
       }
       Eigen::Vector3d over = place;
       over[along_] = mover_.position()[along_];
@@ -312,7 +323,7 @@ class PoseAttempt {
     Eigen::Vector3d up = mover_.position();
     const double clear = Cells(Eigen::Vector3d::Constant(space_.clear_m))[along_];
     if (out_ * (clear - up[along_]) > 0.02) up[along_] = clear;
-    if (!Go(up, "approach")) return {false, false, "insertion: unexpected contact on the way up"};
+    if (!ComeUp(up, "approach")) return {false, false, "insertion: unexpected contact on the way up"};
     const LatticeFrame aligned{world_T_target, Eigen::Vector3d::Zero(), frame_.cell_m};
     Mover mover(episode_.robot, aligned, episode_.options, episode_.record, episode_.started_s);
     const Eigen::Vector3d outward = out_ * Eigen::Vector3d::Unit(along_);
