@@ -17,6 +17,9 @@ constexpr int kUnclearCost = 8;
 /// Goals up to this much farther away, in lattice steps, than the nearest one are looked at too, and at most so many.
 constexpr int kDetour = 6;
 constexpr std::size_t kMostGoals = 24;
+/// A tool that stands next to a wall leaves it no flatter than this, in cells off the wall per cell of its way: the
+/// wall may be turned by a few degrees against what is known.
+constexpr double kLeastSlope = 0.25;
 /// Times that differ by less are the same: the way that was found first stands.
 constexpr double kLess = 1e-9;
 
@@ -50,7 +53,7 @@ class Clearance {
   bool LineIsClear(const Cell& from, const Cell& to, const std::vector<Cell>& walls) {
     const Eigen::Vector3d line = (to - from).cast<double>();
     for (const Cell& wall : walls) {
-      if (line.dot(wall.cast<double>()) >= 0.0) return false;
+      if (line.dot(wall.cast<double>()) > -kLeastSlope * line.norm()) return false;
     }
     if (!Clear(to)) return false;
     const int samples = std::max(1, static_cast<int>(std::ceil(4.0 * line.norm())));
@@ -127,6 +130,32 @@ WayPoints Quickest(const std::vector<Cell>& path, const std::vector<Cell>& walls
   return way;
 }
 
+bool Straight(const Cell& a, const Cell& b, const Cell& c) {
+  return (b - a).cross(c - b).isZero() && (b - a).dot(c - b) > 0;
+}
+
+/// Keeps the corners of a lattice path, then cuts corners off as long as the lines stay clear.
+std::vector<Cell> CutCorners(const std::vector<Cell>& path, Clearance& clearance) {
+  std::vector<Cell> corners;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const bool inner = i > 0 && i + 1 < path.size();
+    if (!inner || !Straight(path[i - 1], path[i], path[i + 1])) corners.push_back(path[i]);
+  }
+  std::vector<Cell> cut = {corners.front()};
+  for (std::size_t at = 0; at + 1 < corners.size();) {
+    std::size_t next = at + 1;
+    for (std::size_t far = corners.size() - 1; far > next; --far) {
+      if (clearance.LineIsClear(corners[at], corners[far], {})) {
+        next = far;
+        break;
+      }
+    }
+    cut.push_back(corners[next]);
+    at = next;
+  }
+  return cut;
+}
+
 }  // namespace
 
 PathGoal EndAt(const Cell& goal) {
@@ -145,7 +174,7 @@ bool IsClear(const planner::ContactMap& map, const Cell& displacement, int orien
 }
 
 std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, const Cell& start, const PathGoal& goal,
-                                              int orientation) {
+                                              int orientation, bool care) {
   CellBox box{map.domain().min - Cell::Constant(2), map.domain().max + Cell::Constant(2)};
   box.min = box.min.cwiseMin(start);
   box.max = box.max.cwiseMax(start);
@@ -176,6 +205,7 @@ std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, co
         path.push_back(path.back() - UnitCell(kDirections[arrival[i]]));
       }
       std::ranges::reverse(path);
+      if (care) return CutCorners(path, clearance);
       WayPoints way = Quickest(path, walls, clearance);
       way.time += *rest;
       if (way.time < best.time - kLess) best = std::move(way);

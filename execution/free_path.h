@@ -24,8 +24,11 @@ PathGoal EndAt(const Cell& goal);
 /// least time. Lines stay clear. Displacements that are free but not clear are crossed only where nothing else is left,
 /// as near a wall that was just touched, which a line may leave at an angle. Searches the domain of the map grown by
 /// two cells, and `start`. Empty: there is no way.
+///
+/// With `care`, for a target that may be turned or not where it is thought to be, the tool keeps to the lattice path to
+/// the nearest goal, which leaves walls squarely and goes around corners, cut only between its own corners.
 std::optional<std::vector<Cell>> FindFreePath(const planner::ContactMap& map, const Cell& start, const PathGoal& goal,
-                                              int orientation = 0);
+                                              int orientation = 0, bool care = false);
 
 /// The free displacement nearest to a continuous one (cells), within two cells; the nearest lattice point if none is.
 /// A tool beside a wall may round into it.

@@ -66,7 +66,7 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
                                 const BroadWall& wall, int offset, double slack, const char* kind, Mover& mover) {
   const Cell goal = wall.middle + offset * UnitCell(MakeDirection(wall.along, 1));
   const auto path =
-      FindFreePath(map, NearestFree(map, mover.position() - target, orientation), EndAt(goal), orientation);
+      FindFreePath(map, NearestFree(map, mover.position() - target, orientation), EndAt(goal), orientation, true);
   if (!path) return std::nullopt;
   std::vector<Touch> ignored;
   if (!FollowPath(map, target, *path, "transfer", mover, ignored)) return std::nullopt;

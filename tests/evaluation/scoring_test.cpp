@@ -73,7 +73,6 @@ TEST(Adversaries, PoliciesFailWithTheirReason) {
          return policies::Insert{false, std::nullopt};
        },
        ""},
-      {"declares success, confirming", [](int) { return policies::Insert{}; }, ""},
       {"leaves the workspace",
        [](int) {
          return GuardedMove{Direction::kPlusX, 1000};
@@ -115,6 +114,18 @@ TEST(Adversaries, PoliciesFailWithTheirReason) {
     EXPECT_FALSE(record.reason.empty()) << c.name;
     EXPECT_EQ(record.reason.find(c.reason), 0U) << c.name << ": " << record.reason;
     EXPECT_NE(record.reason, "inserted") << c.name;
+  }
+}
+
+TEST(Adversaries, WhoLeavesAllToTheConfirmingTouchesIsScoredByWhereTheToolIs) {
+  // The executor's own touches may find the target for it: then it has earned what the world says, and no more.
+  const workflow::EpisodeRecord record = RunOnce([](int) { return policies::Insert{}; });
+  EXPECT_EQ(record.inserted, record.depth_m > 0.9 * Setup()->task().insertion_depth_m) << record.reason;
+  EXPECT_EQ(record.reason == "inserted", record.inserted);
+  if (record.localized) {
+    ASSERT_TRUE(record.execution.world_T_estimate.has_value());
+    EXPECT_LT((record.execution.world_T_estimate->translation() - record.world_T_true.translation()).head<2>().norm(),
+              0.002);
   }
 }
 
