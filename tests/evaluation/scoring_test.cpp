@@ -117,10 +117,12 @@ TEST(Adversaries, PoliciesFailWithTheirReason) {
   }
 }
 
+double DepthAsked() { return Setup()->task().insertion_depth_m; }
+
 TEST(Adversaries, WhoLeavesAllToTheConfirmingTouchesIsScoredByWhereTheToolIs) {
   // The executor's own touches may find the target for it: then it has earned what the world says, and no more.
   const workflow::EpisodeRecord record = RunOnce([](int) { return policies::Insert{}; });
-  EXPECT_EQ(record.inserted, record.depth_m > 0.9 * Setup()->task().insertion_depth_m) << record.reason;
+  EXPECT_EQ(record.inserted, record.depth_m > 0.9 * DepthAsked()) << record.reason;
   EXPECT_EQ(record.reason == "inserted", record.inserted);
   if (record.localized) {
     ASSERT_TRUE(record.execution.world_T_estimate.has_value());
