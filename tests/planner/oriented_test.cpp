@@ -185,8 +185,9 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
   // Where only distance costs, the tables are exact: the cost of the policy that is found for a line alone, which no
   // lower bound can be above and no policy below.
   Task task = testing::MakePipeTask(2, 4);
-  task.workspace_m = Eigen::Vector3d(0.07, 0.06, 0.03);
-  const auto map = testing::MakePipeMap(task, 0.35);
+  task.start_offset_m = Eigen::Vector3d(0.006, 0.0, 0.008);
+  task.workspace_m = Eigen::Vector3d(0.05, 0.044, 0.022);
+  const auto map = testing::MakePipeMap(task, 0.25);
   const Problem whole = MakeCuboidProblem(task, map, {1, 1, 1, 4, 4});
   const OrientedLines lines(whole, StepFlagsGrid(*map, Parallelism(1)),
                             LowerStepCosts(task.cost, whole.move_lengths.back()), Parallelism(1), {});
@@ -233,8 +234,10 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
 }
 
 TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
-  const Task task = testing::MakePipeTask(3, 3);
-  const auto map = testing::MakePipeMap(task, 0.5);
+  Task task = testing::MakePipeTask(3, 3);
+  task.start_offset_m = Eigen::Vector3d(0.006, 0.0, 0.01);
+  task.workspace_m = Eigen::Vector3d(0.06, 0.05, 0.026);
+  const auto map = testing::MakePipeMap(task, 0.35);
   const Problem problem = MakeCuboidProblem(task, map, {3, 2, 1, 3, 3});
   const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
   BeliefGraph graph(problem, tables.masks(), true);
