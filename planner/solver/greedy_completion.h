@@ -7,6 +7,7 @@
 #include <optional>
 #include <queue>
 #include <tuple>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -21,23 +22,35 @@ namespace feeler::planner {
 /// each outcome. It always ends, because every such step leaves fewer hypotheses. Used as an incumbent where RTDP-Bel
 /// takes long. Same interface as RtdpBel, so that BoundedSearch can start from either.
 ///
-/// It may be run again with the heuristic inflated, which judges splits otherwise (a lower bound makes early splits
-/// that leave much to do look cheap): of each belief the best policy found in any run is kept.
+/// It may be run again with another judgement of what walks and splits cost (a lower bound makes early splits that
+/// leave much to do look cheap): of each belief the best policy found in any run is kept.
 template <BeliefModel Model>
 class GreedyCompletion {
  public:
   using Belief = std::uint32_t;
+  using ModelAction = std::remove_cvref_t<decltype(*std::declval<Model&>().Actions(0).begin())>;
+
+  /// By what a run chooses its plans; what they really cost is summed all the same.
+  struct Judgement {
+    std::function<double(Belief)> guess;             ///< of the value of a belief, times its weight
+    std::function<double(const ModelAction&)> cost;  ///< of an action, times the weight of the belief; none: as it is
+  };
 
   /// `estimate` guesses the value of a belief times its weight; without it the heuristic does.
-  explicit GreedyCompletion(Model& model, std::function<double(Belief)> estimate = {})
-      : model_(model), estimate_(std::move(estimate)) {}
+  explicit GreedyCompletion(Model& model, std::function<double(Belief)> estimate = {}) : model_(model) {
+    judgement_.guess = estimate ? std::move(estimate) : [&model](Belief b) { return model.Heuristic(b); };
+  }
 
   /// Finds a policy from `start`; kUnlocalizable if there is none by the heuristic. Nothing is kept of beliefs in work
   /// when `stop(expansions)` interrupts.
   template <class Stop>
-  std::optional<SolverStatus> Run(Belief start, Stop stop, double inflation = 1.0) {
+  std::optional<SolverStatus> Run(Belief start, Stop stop) {
+    return Run(start, stop, judgement_);
+  }
+
+  template <class Stop>
+  std::optional<SolverStatus> Run(Belief start, Stop stop, const Judgement& judgement) {
     ++run_;
-    inflation_ = inflation;
     plans_.clear();
     std::vector<Belief> open = {start};
     while (!open.empty()) {
@@ -47,7 +60,7 @@ class GreedyCompletion {
         continue;
       }
       if (!plans_.contains(b)) {
-        if (const auto why = MakePlan(b, stop)) return why;
+        if (const auto why = MakePlan(b, stop, judgement)) return why;
       }
       const Plan& plan = plans_.at(b);
       bool ready = true;
@@ -101,16 +114,14 @@ class GreedyCompletion {
   }
 
   bool Settled(Belief b) const { return b < nodes_.size() && nodes_[b].run == run_; }
-  double Guess(Belief b) const { return inflation_ * (estimate_ ? estimate_(b) : model_.Heuristic(b)); }
-  double Estimate(Belief b) const { return Settled(b) ? nodes_[b].value : Guess(b); }
 
   template <class Stop>
-  std::optional<SolverStatus> MakePlan(Belief start, Stop& stop) {
+  std::optional<SolverStatus> MakePlan(Belief start, Stop& stop, const Judgement& judgement) {
     // A* over the beliefs with the same hypotheses; ends when no further walk can lead to a better split.
     using Entry = std::tuple<double, Belief>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
     std::unordered_map<Belief, Reached> reached = {{start, {}}};
-    queue.emplace(Guess(start), start);
+    queue.emplace(judgement.guess(start), start);
     double best = std::numeric_limits<double>::infinity();
     std::pair<Belief, int> last = {start, -1};
     while (!queue.empty()) {
@@ -118,17 +129,18 @@ class GreedyCompletion {
       queue.pop();
       if (estimate >= best) break;
       const double cost = reached.at(b).cost;
-      if (estimate > cost + Guess(b) + 1e-9 * (1.0 + estimate)) continue;  // outdated
+      if (estimate > cost + judgement.guess(b) + 1e-9 * (1.0 + estimate)) continue;  // outdated
       if (const auto why = stop(expansions_)) return why;
       if (!model_.expanded(b)) ++expansions_;
       int index = -1;
       for (const auto& action : model_.Actions(b)) {
         ++index;
-        double value = cost + action.cost;
+        const double walked = cost + (judgement.cost ? judgement.cost(action) : action.cost);
+        double value = walked;
         Belief only = 0;
         int successors = 0;
         model_.ForEachSuccessor(action, [&](Belief next) {
-          value += Estimate(next);
+          value += Settled(next) ? nodes_[next].value : judgement.guess(next);
           only = next;
           ++successors;
         });
@@ -140,10 +152,10 @@ class GreedyCompletion {
           }
           continue;
         }
-        const auto [at, added] = reached.try_emplace(only, Reached{cost + action.cost, b, index});
+        const auto [at, added] = reached.try_emplace(only, Reached{walked, b, index});
         if (!added) {
-          if (cost + action.cost >= at->second.cost) continue;
-          at->second = {cost + action.cost, b, index};
+          if (walked >= at->second.cost) continue;
+          at->second = {walked, b, index};
         }
         queue.emplace(value, only);
       }
@@ -160,12 +172,11 @@ class GreedyCompletion {
   }
 
   Model& model_;
-  std::function<double(Belief)> estimate_;
+  Judgement judgement_;  ///< of the first run
   std::vector<State> nodes_;
   std::unordered_map<Belief, Plan> plans_;
   std::int64_t expansions_ = 0;
   std::int32_t run_ = 0;
-  double inflation_ = 1.0;
 };
 
 }  // namespace feeler::planner

@@ -1,7 +1,6 @@
 #include "planner/solver/solve.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -18,6 +17,7 @@
 #include "planner/solver/indistinguishable.h"
 #include "planner/solver/open_policy.h"
 #include "planner/solver/planning_tables.h"
+#include "planner/solver/random_judgement.h"
 #include "planner/solver/rtdp_bel.h"
 #include "planner/solver/stop_watch.h"
 
@@ -27,9 +27,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Up to so many hypotheses the greedy policy is tried beside the one for openings.
 constexpr std::uint32_t kGreedyBesideOpen = 256;
-/// Of the heuristic where hypotheses have orientations, which makes it loose: in further greedy policies (which one
-/// serves best differs from problem to problem) and in the guess of BoundedSearch.
-constexpr std::array kInflations = {1.2, 1.4, 1.7, 2.0};
+/// Where hypotheses have orientations, which makes the heuristic loose: at most so many further greedy policies, and
+/// the inflation of the heuristic in the guess of BoundedSearch.
+constexpr std::uint64_t kFurtherPolicies = 120;
 constexpr double kGuessInflation = 1.3;
 
 /// epsilon * heur, times the weight of the belief.
@@ -157,10 +157,10 @@ class Attempt {
 
   /// Further policies while the gap is open: with orientations the first may be far off.
   void Improve(GreedyCompletion<BeliefGraph>& greedy) {
-    for (const double inflation : kInflations) {
+    const auto stop = [this](std::int64_t expansions) { return Stop(expansions); };
+    for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
       if (greedy.Value(start_) <= options_.gap * result_.lower_bound * weight_) return;
-      greedy.Run(
-          start_, [this](std::int64_t expansions) { return Stop(expansions); }, inflation);
+      if (greedy.Run(start_, stop, RandomJudgement(graph_, options_.seed, number))) return;
     }
   }
 

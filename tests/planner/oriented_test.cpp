@@ -8,8 +8,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
+#include <set>
 
 #include "core/error.h"
 #include "planner/belief/belief_graph.h"
@@ -20,6 +21,7 @@
 #include "planner/solver/freeze_policy.h"
 #include "planner/solver/greedy_completion.h"
 #include "planner/solver/planning_tables.h"
+#include "planner/solver/random_judgement.h"
 #include "tests/planner/oriented_problems.h"
 #include "tests/planner/synthetic_pipe.h"
 #include "tests/planner/synthetic_plug.h"
@@ -233,10 +235,15 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
   EXPECT_GT(compared, 20);
 }
 
-TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
+Task SmallPipeTask() {
   Task task = testing::MakePipeTask(3, 3);
   task.start_offset_m = Eigen::Vector3d(0.006, 0.0, 0.01);
   task.workspace_m = Eigen::Vector3d(0.06, 0.05, 0.026);
+  return task;
+}
+
+TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
+  const Task task = SmallPipeTask();
   const auto map = testing::MakePipeMap(task, 0.35);
   const Problem problem = MakeCuboidProblem(task, map, {3, 2, 1, 3, 3});
   const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
@@ -246,10 +253,11 @@ TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
   GreedyCompletion<BeliefGraph> greedy(graph);
   const BeliefId start = graph.Start();
   const auto never = [](std::int64_t) { return std::optional<SolverStatus>(); };
-  double before = std::numeric_limits<double>::infinity();
+  ASSERT_FALSE(greedy.Run(start, never).has_value());
+  double before = greedy.Value(start);
   int improved = 0;
-  for (const double inflation : {1.0, 1.2, 1.4, 1.7, 2.0}) {
-    ASSERT_FALSE(greedy.Run(start, never, inflation).has_value());
+  for (std::uint64_t number = 0; number < 12; ++number) {
+    ASSERT_FALSE(greedy.Run(start, never, RandomJudgement(graph, 1, number)).has_value());
     const double value = greedy.Value(start);
     ASSERT_LE(value, before);
     improved += value < before ? 1 : 0;
@@ -263,6 +271,39 @@ TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
         << "each belief's best, whatever run it is from";
   }
   EXPECT_GT(improved, 0);
+}
+
+TEST(Oriented, JudgementsDifferAndRepeat) {
+  const Task task = SmallPipeTask();
+  const Problem problem = MakeCuboidProblem(task, testing::MakePipeMap(task, 0.35), {3, 2, 1, 2, 2});
+  const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
+  BeliefGraph graph(problem, tables.masks(), true);
+  const auto heuristic = tables.MakeHeuristic(problem, graph.sets());
+  graph.SetHeuristic(heuristic.get());
+  const BeliefId start = graph.Start();
+  const double bits = std::log2(static_cast<double>(problem.hypotheses.size()));
+  std::set<double> guesses;
+  for (std::uint64_t number = 0; number < 20; ++number) {
+    const auto judgement = RandomJudgement(graph, 5, number);
+    const double guess = judgement.guess(start);
+    EXPECT_GE(guess, graph.Heuristic(start));
+    EXPECT_LE(guess, 2.0 * graph.Heuristic(start) + 2.0 * bits * graph.Weight(start));
+    EXPECT_EQ(guess, RandomJudgement(graph, 5, number).guess(start)) << "same seed, same number";
+    guesses.insert(guess);
+    std::array<double, 3> along{};
+    for (const BeliefAction& action : graph.Actions(start)) {
+      const double factor = judgement.cost(action) / action.cost;
+      EXPECT_GE(factor, 0.6);
+      EXPECT_LE(factor, 1.65);
+      double& known = along[static_cast<std::size_t>(AxisOf(action.direction))];
+      if (known > 0.0) {
+        EXPECT_NEAR(factor, known, 1e-12) << "one factor an axis";
+      }
+      known = factor;
+    }
+  }
+  EXPECT_EQ(guesses.size(), 20U);
+  EXPECT_NE(RandomJudgement(graph, 5, 0).guess(start), RandomJudgement(graph, 6, 0).guess(start));
 }
 
 }  // namespace
