@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kLookAhead = 256;
 /// Budget of the certified solver for a problem where none is given.
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
-constexpr std::int64_t kDefaultExpansionLimitOrientations = 30000;
+constexpr std::int64_t kDefaultExpansionLimitOrientations = 60000;
 constexpr std::int64_t kDefaultExpansionLimitSmallOrientations = 200000;
 constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
 

@@ -37,7 +37,7 @@ inline constexpr int kSmallOrientedHypotheses = 600;
 
 /// The options that a problem of so many hypotheses in a family is solved with: the certified solver without any limit
 /// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
-/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 30,000 above, where many stay open. 500
+/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 60,000 above, where many stay open. 500
 /// where the map has openings: the first policy and the bound at the start are all there, and the search between them
 /// adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
 SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},

@@ -155,9 +155,12 @@ class Attempt {
 
   bool Oriented() const { return graph_.problem().map->orientations() > 1; }
 
-  /// Further policies while the gap is open: with orientations the first may be far off.
+  /// Further policies while the gap is open, with up to half of the budget: with orientations the first may be far off.
   void Improve(GreedyCompletion<BeliefGraph>& greedy) {
-    const auto stop = [this](std::int64_t expansions) { return Stop(expansions); };
+    const auto stop = [this](std::int64_t expansions) -> std::optional<SolverStatus> {
+      if (expansions >= options_.expansion_limit / 2) return SolverStatus::kExpansionLimit;
+      return Stop(expansions);
+    };
     for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
       if (greedy.Value(start_) <= options_.gap * result_.lower_bound * weight_) return;
       if (greedy.Run(start_, stop, RandomJudgement(graph_, options_.seed, number))) return;
