@@ -235,15 +235,15 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
   EXPECT_GT(compared, 20);
 }
 
-Task SmallPipeTask() {
-  Task task = testing::MakePipeTask(3, 3);
+Task SmallPipeTask(int yaws, int pitches) {
+  Task task = testing::MakePipeTask(yaws, pitches);
   task.start_offset_m = Eigen::Vector3d(0.006, 0.0, 0.01);
   task.workspace_m = Eigen::Vector3d(0.06, 0.05, 0.026);
   return task;
 }
 
 TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
-  const Task task = SmallPipeTask();
+  const Task task = SmallPipeTask(3, 3);
   const auto map = testing::MakePipeMap(task, 0.35);
   const Problem problem = MakeCuboidProblem(task, map, {3, 2, 1, 3, 3});
   const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
@@ -274,7 +274,7 @@ TEST(Oriented, FurtherFirstPoliciesOnlyImprove) {
 }
 
 TEST(Oriented, JudgementsDifferAndRepeat) {
-  const Task task = SmallPipeTask();
+  const Task task = SmallPipeTask(2, 2);
   const Problem problem = MakeCuboidProblem(task, testing::MakePipeMap(task, 0.35), {3, 2, 1, 2, 2});
   const PlanningTables tables(problem, SolverOptions(), Parallelism(2));
   BeliefGraph graph(problem, tables.masks(), true);
