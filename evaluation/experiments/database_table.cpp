@@ -240,6 +240,12 @@ TableRow FastRtdpBelRow() {
   return {{"rtdp-bel 1.2 fast", "fast", planner::FastSetting(planner::SolverKind::kRtdpBel, 1.2)}, std::nullopt};
 }
 
+planner::SolverOptions CertificateSetting(planner::SolverKind solver, double epsilon) {
+  planner::SolverOptions options = planner::PaperSetting(solver, epsilon);
+  options.heuristic = planner::HeuristicKind::kCertificate;
+  return options;
+}
+
 DatabaseTable WithPrintedValuesOf(DatabaseTable table, const std::string& task) {
   if (task == "plug") return table;
   const bool pipe = task.starts_with("pipe") || task.starts_with("elbow");

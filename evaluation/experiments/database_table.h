@@ -51,6 +51,8 @@ struct DatabaseTable {
 /// Rows of the reference solvers in the fast setting: certified to 1.2 and RTDP-Bel at epsilon 1.2.
 TableRow FastCertifiedRow();
 TableRow FastRtdpBelRow();
+/// The paper's algorithms with the bound that seeds experience where orientations are uncertain, too (setting `certs`).
+planner::SolverOptions CertificateSetting(planner::SolverKind solver, double epsilon);
 /// The printed values that belong to a task: those of the plug for "plug", those of Table IV for solvers of pipe tasks,
 /// none for other tasks.
 DatabaseTable WithPrintedValuesOf(DatabaseTable table, const std::string& task);

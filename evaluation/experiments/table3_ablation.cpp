@@ -1,15 +1,15 @@
 #include "evaluation/experiments/table3_ablation.h"
 
 namespace feeler::evaluation {
+namespace {
 
-DatabaseTable Table3Ablation() {
+DatabaseTable Ablation(const std::string& setting, const planner::SolverOptions& options) {
   DatabaseTable table;
   table.name = kTable3AblationName;
   table.title = "Table III, what the choice of experience and the order of problems do for E-RTDP-Bel at epsilon 2";
   const auto add = [&](const std::string& variant, planner::ExperienceKind experience, planner::ProblemOrder order) {
     table.rows.push_back(
-        {{variant, "paper", planner::PaperSetting(planner::SolverKind::kERtdpBel, 2.0), order, experience},
-         PrintedVariant("table3_ablation_plug", variant)});
+        {{variant, setting, options, order, experience}, PrintedVariant("table3_ablation_plug", variant)});
   };
   add("ours", planner::ExperienceKind::kRollout, planner::ProblemOrder::kUncertainty);
   add("naive", planner::ExperienceKind::kNaive, planner::ProblemOrder::kUncertainty);
@@ -25,10 +25,19 @@ DatabaseTable Table3Ablation() {
   return table;
 }
 
+}  // namespace
+
+DatabaseTable Table3Ablation() { return Ablation("paper", planner::PaperSetting(planner::SolverKind::kERtdpBel, 2.0)); }
+
+DatabaseTable Table3AblationWithOrientations() {
+  return Ablation("certs", CertificateSetting(planner::SolverKind::kERtdpBel, 2.0));
+}
+
 ExperimentResult RunTable3Ablation(const ExperimentRequest& request) {
   const PlanningCase planning = LoadPlanningCase("plug", false, request);
-  return RunDatabaseTable(planning, WithPrintedValuesOf(Table3Ablation(), planning.task.name),
-                          ProtocolFor(request.quick), request);
+  const DatabaseTable table = planning.map->orientations() > 1 ? Table3AblationWithOrientations() : Table3Ablation();
+  return RunDatabaseTable(planning, WithPrintedValuesOf(table, planning.task.name), ProtocolFor(request.quick),
+                          request);
 }
 
 }  // namespace feeler::evaluation

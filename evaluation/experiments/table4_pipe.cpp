@@ -3,17 +3,6 @@
 #include <fmt/format.h>
 
 namespace feeler::evaluation {
-namespace {
-
-/// The paper's algorithms with the bound that seeds experience where orientations are uncertain, too.
-planner::SolverOptions CertificateSetting(planner::SolverKind solver, double epsilon) {
-  planner::SolverOptions options = planner::PaperSetting(solver, epsilon);
-  options.heuristic = planner::HeuristicKind::kCertificate;
-  return options;
-}
-
-}  // namespace
-
 DatabaseTable Table4Pipe() {
   DatabaseTable table;
   table.name = kTable4PipeName;

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <string>
 
 #include "core/error.h"
 #include "evaluation/experiments/bounds.h"
@@ -295,8 +296,9 @@ TEST_P(DatabaseTables, SecondRunRerunsNothingAndLeavesTheSameFiles) {
   EXPECT_THROW(RunExperiment(SmallTable(GetParam()), other), InputError);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tables, DatabaseTables, ::testing::Values(Table1Plug, Table3Ablation),
-                         [](const auto& parameter) { return parameter.index == 0 ? "Table1" : "Table3"; });
+INSTANTIATE_TEST_SUITE_P(Tables, DatabaseTables,
+                         ::testing::Values(Table1Plug, Table3Ablation, Table3AblationWithOrientations),
+                         [](const auto& parameter) { return "Table" + std::to_string(parameter.index); });
 
 TEST(Bounds, CloseAndStayOrdered) {
   BoundsProtocol protocol;
