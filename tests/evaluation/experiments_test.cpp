@@ -5,6 +5,7 @@
 // close.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -32,7 +33,9 @@ SolveRecord CutShort(double cpu_s, std::int64_t expansions) {
 }
 
 std::string Scratch(const std::string& name) {
-  const std::string folder = testing::TempDir() + "/feeler_experiments_" + name;
+  std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();  // tests run side by side
+  std::ranges::replace(test, '/', '_');
+  const std::string folder = testing::TempDir() + "/feeler_experiments_" + test + "_" + name;
   fs::remove_all(folder);
   fs::create_directories(folder);
   return folder;
