@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 namespace feeler::evaluation {
+
 DatabaseTable Table4Pipe() {
   DatabaseTable table;
   table.name = kTable4PipeName;

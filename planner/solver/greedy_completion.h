@@ -48,6 +48,7 @@ class GreedyCompletion {
     return Run(start, stop, judgement_);
   }
 
+  /// The same by another judgement.
   template <class Stop>
   std::optional<SolverStatus> Run(Belief start, Stop stop, const Judgement& judgement) {
     ++run_;
