@@ -8,11 +8,12 @@
 #include <memory>
 #include <vector>
 
-#include "env/insertion_env.h"
-#include "env/scene.h"
-#include "env/task_file.h"
-#include "env/transfer_checker.h"
-#include "env/vector_env.h"
+#include "feeler/core/clock.h"
+#include "feeler/env/gym/insertion_env.h"
+#include "feeler/env/gym/vector_env.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/robot/transfer_checker.h"
+#include "feeler/env/scene/scene.h"
 
 namespace feeler::env {
 namespace {
@@ -50,13 +51,6 @@ void Bring(InsertionEnv& env, bool contact) {
 }
 
 constexpr int kTurn = 200;  ///< steps
-
-// CPU time of this thread, so that other load on the machine does not count.
-double Seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 void RawStep(benchmark::State& state) {
   InsertionEnv env(PlugScene());
@@ -104,13 +98,13 @@ void WrappedOverRaw(benchmark::State& state) {
   double wrapped_s = 1e9;
   for (auto _ : state) {
     mj_copyData(data.get(), model, start.get());
-    double begin_s = Seconds();
+    double begin_s = ThreadCpuSeconds();
     for (int i = 0; i < kTurn; ++i) mj_step(model, data.get());
-    raw_s = std::min(raw_s, (Seconds() - begin_s) / kTurn);
+    raw_s = std::min(raw_s, (ThreadCpuSeconds() - begin_s) / kTurn);
     const int actions = std::max(1, kTurn / still.steps);
-    begin_s = Seconds();
+    begin_s = ThreadCpuSeconds();
     for (int i = 0; i < actions; ++i) benchmark::DoNotOptimize(env.Step(still));
-    wrapped_s = std::min(wrapped_s, (Seconds() - begin_s) / (actions * still.steps));
+    wrapped_s = std::min(wrapped_s, (ThreadCpuSeconds() - begin_s) / (actions * still.steps));
   }
   state.counters["raw_us"] = 1e6 * raw_s;
   state.counters["wrapped_us"] = 1e6 * wrapped_s;

@@ -1,8 +1,8 @@
 // CPU time of one registration: the plug's panel and housing as a depth camera at 1.4 m sees them, with 2 mm of noise.
 #include <benchmark/benchmark.h>
 
-#include "core/random.h"
-#include "perception/registration.h"
+#include "feeler/core/random.h"
+#include "feeler/perception/registration.h"
 
 namespace feeler::perception {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <benchmark/benchmark.h>
 
-#include "planner/belief/belief_graph.h"
-#include "planner/preprocess/preprocess.h"
-#include "planner/solver/experience.h"
-#include "planner/solver/planning_tables.h"
-#include "planner/solver/solve.h"
+#include "feeler/planner/belief/belief_graph.h"
+#include "feeler/planner/bounds/planning_tables.h"
+#include "feeler/planner/family/preprocess.h"
+#include "feeler/planner/search/experience.h"
+#include "feeler/planner/solve.h"
 #include "tests/planner/synthetic_plug.h"
 
 namespace feeler::planner {
@@ -126,7 +126,7 @@ BENCHMARK(BuildTables)->ArgName("paper")->Arg(0)->Arg(1)->Unit(benchmark::kMilli
 class CountingSink : public PolicySink {
  public:
   bool Done(const Extents& /*extents*/) override { return false; }
-  std::optional<Policy> Load(const Extents& /*extents*/) override { return std::nullopt; }
+  std::optional<PolicyGraph> Load(const Extents& /*extents*/) override { return std::nullopt; }
   void Store(const Extents& /*extents*/, const Problem& /*problem*/, const SolverResult& result) override {
     cost += result.expected_cost;
     worst_ratio = std::max(worst_ratio, result.Ratio());

@@ -7,10 +7,10 @@
 #include <memory>
 #include <string>
 
-#include "planner/solver/solve.h"
-#include "policies/database_policy.h"
-#include "policies/storage/database.h"
-#include "policies/touch_based_localization.h"
+#include "feeler/planner/solve.h"
+#include "feeler/policies/database_policy.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/policies/touch/touch_based_localization.h"
 #include "tests/planner/synthetic_plug.h"
 
 namespace feeler::policies {
@@ -86,7 +86,7 @@ void NextMove(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
   Database database = Database::OpenReadOnly(TheDatabase().path);
   const planner::Problem problem = TheDatabase().Problem(n);
-  DatabasePolicy policy(std::make_shared<const planner::Policy>(*database.Get({n, n, n})->policy));
+  DatabasePolicy policy(std::make_shared<const planner::PolicyGraph>(*database.Get({n, n, n})->policy));
   std::int64_t moves = 0;
   std::size_t truth = 0;
   for (auto _ : state) {

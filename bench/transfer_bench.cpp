@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "core/random.h"
-#include "env/scene.h"
-#include "env/task_file.h"
-#include "env/transfer_checker.h"
+#include "feeler/core/clock.h"
+#include "feeler/core/random.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/robot/transfer_checker.h"
+#include "feeler/env/scene/scene.h"
 
 namespace feeler::env {
 namespace {
@@ -50,12 +51,6 @@ void BM_ValidityCheck(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());
   state.counters["free"] = static_cast<double>(free) / static_cast<double>(state.iterations());
   state.SetLabel(kScenes[state.range(0)]);
-}
-
-double ThreadCpuMilliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
 /// A chain of plans to random poses, each from where the last one ended. Times are spread over three decades: see the

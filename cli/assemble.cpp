@@ -8,13 +8,13 @@
 #include <thread>
 #include <vector>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "evaluation/statistics.h"
-#include "workflow/assembly_builds.h"
-#include "workflow/assembly_video.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/evaluation/records/statistics.h"
+#include "feeler/workflow/assembly/assembly_builds.h"
+#include "feeler/workflow/assembly/assembly_video.h"
 
 namespace feeler::cli {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/session.h"
+#include "feeler/cli/session.h"
 
 namespace feeler::cli {
 

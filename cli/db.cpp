@@ -4,14 +4,14 @@
 #include <memory>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/db_summary.h"
-#include "cli/policy_output.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "planner/solver/evaluate.h"
-#include "workflow/database_builder.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/db_summary.h"
+#include "feeler/cli/policy_output.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/policy/evaluate.h"
+#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "cli/db_summary.h"
+#include "feeler/cli/db_summary.h"
 
 #include <fmt/format.h>
 

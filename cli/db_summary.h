@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "policies/storage/database.h"
+#include "feeler/policies/storage/database.h"
 
 namespace feeler::cli {
 

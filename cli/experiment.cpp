@@ -5,11 +5,11 @@
 #include <memory>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "evaluation/experiments/registry.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/evaluation/registry.h"
 
 namespace feeler::cli {
 namespace {

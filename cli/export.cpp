@@ -3,12 +3,12 @@
 #include <limits>
 #include <memory>
 
-#include "cli/commands.h"
-#include "core/error.h"
-#include "evaluation/experiment_output.h"
-#include "planner/belief/lattice_problem.h"
-#include "policies/formats/lattice_problem_file.h"
-#include "policies/formats/pomdp_export.h"
+#include "feeler/cli/commands.h"
+#include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/policies/io/lattice_problem_file.h"
+#include "feeler/policies/io/pomdp_export.h"
 
 namespace feeler::cli {
 namespace {
@@ -33,7 +33,7 @@ void Run(const Flags& flags) {
   if (flags.out.empty()) {
     std::cout << text;
   } else {
-    evaluation::WriteFileAtomically(flags.out, text);
+    WriteFileAtomically(flags.out, text);
   }
 }
 

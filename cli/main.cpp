@@ -5,8 +5,8 @@
 #include <csignal>
 #include <exception>
 
-#include "cli/commands.h"
-#include "core/error.h"
+#include "feeler/cli/commands.h"
+#include "feeler/core/error.h"
 
 namespace {
 

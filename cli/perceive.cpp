@@ -1,5 +1,5 @@
 // feeler perceive: from a depth image or point cloud to hypotheses; and the uncertainty table that this takes.
-#include "workflow/perceive.h"
+#include "feeler/workflow/perception/perceive.h"
 
 #include <fmt/format.h>
 
@@ -7,19 +7,19 @@
 #include <optional>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "env/fingerprint.h"
-#include "env/task_file.h"
-#include "perception/cloud_file.h"
-#include "perception/depth_file.h"
-#include "perception/input_file.h"
-#include "policies/storage/database.h"
-#include "workflow/calibrate.h"
-#include "workflow/episode_draw.h"
-#include "workflow/perceive_table.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/env/model/fingerprint.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/perception/cloud_file.h"
+#include "feeler/perception/depth_file.h"
+#include "feeler/perception/input_file.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/workflow/episode/episode_draw.h"
+#include "feeler/workflow/perception/calibrate.h"
+#include "feeler/workflow/perception/perceive_table.h"
 
 namespace feeler::cli {
 namespace {

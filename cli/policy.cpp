@@ -6,18 +6,18 @@
 #include <memory>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "evaluation/experiment_output.h"
-#include "planner/belief/lattice_problem.h"
-#include "planner/solver/expand_policy.h"
-#include "policies/formats/lattice_problem_file.h"
-#include "policies/formats/policy_graph.h"
-#include "policies/formats/policy_json.h"
-#include "policies/storage/database.h"
-#include "workflow/database_builder.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/policy/expand_policy.h"
+#include "feeler/policies/io/lattice_problem_file.h"
+#include "feeler/policies/io/policy_drawing.h"
+#include "feeler/policies/io/policy_json.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -100,7 +100,7 @@ void Graph(const Flags& flags) {
   }
   RequireOneSource(flags);
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
-  policies::PolicyGraphOptions options;
+  policies::PolicyDrawingOptions options;
   options.max_depth = flags.max_depth;
   options.min_probability = flags.min_probability;
   const planner::ExpandedPolicy policy = flags.db.empty() ? FromFile(flags) : FromDatabase(flags);
@@ -110,7 +110,7 @@ void Graph(const Flags& flags) {
   if (flags.out.empty()) {
     std::cout << text;
   } else {
-    evaluation::WriteFileAtomically(flags.out, text);
+    WriteFileAtomically(flags.out, text);
   }
 }
 

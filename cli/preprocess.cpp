@@ -4,15 +4,15 @@
 #include <memory>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/db_summary.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "env/fingerprint.h"
-#include "policies/formats/problem_family_file.h"
-#include "workflow/database_builder.h"
-#include "workflow/perceive_table.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/db_summary.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/env/model/fingerprint.h"
+#include "feeler/policies/io/problem_family_file.h"
+#include "feeler/workflow/perception/perceive_table.h"
+#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "core/progress.h"
+#include "feeler/core/progress.h"
 
 namespace feeler::cli {
 

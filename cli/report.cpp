@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <memory>
 
-#include "cli/commands.h"
-#include "core/error.h"
-#include "evaluation/experiment_output.h"
-#include "evaluation/report/page.h"
+#include "feeler/cli/commands.h"
+#include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/evaluation/report/page.h"
 
 namespace feeler::cli {
 namespace {
@@ -33,7 +33,7 @@ void Run(const Flags& flags, Session& session) {
   evaluation::ReportOptions options;
   options.replay_bytes = std::llround(1e6 * flags.replay_megabytes);
   const std::string page = evaluation::ReportPage(results, flags.folder, options);
-  evaluation::WriteFileAtomically(flags.out, page);
+  WriteFileAtomically(flags.out, page);
 
   std::size_t episodes = 0;
   for (const evaluation::ReportedRecords& records : results.records) episodes += records.episodes.size();

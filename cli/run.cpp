@@ -10,20 +10,20 @@
 #include <thread>
 #include <vector>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "env/fingerprint.h"
-#include "env/scene.h"
-#include "evaluation/episode_json.h"
-#include "evaluation/report/scene_geometry.h"
-#include "evaluation/run_summary.h"
-#include "workflow/database_builder.h"
-#include "workflow/episode.h"
-#include "workflow/episode_noise.h"
-#include "workflow/episode_video.h"
-#include "workflow/perceive_table.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/env/model/fingerprint.h"
+#include "feeler/env/scene/scene.h"
+#include "feeler/evaluation/records/episode_json.h"
+#include "feeler/evaluation/records/run_summary.h"
+#include "feeler/evaluation/records/scene_geometry.h"
+#include "feeler/workflow/episode/episode.h"
+#include "feeler/workflow/episode/episode_faults.h"
+#include "feeler/workflow/episode/episode_video.h"
+#include "feeler/workflow/perception/perceive_table.h"
+#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -54,7 +54,7 @@ struct Flags {
 /// The names, and a line about each.
 std::string NoiseHelp() {
   std::string help = "one of these, or several with commas between:";
-  for (const workflow::NoiseName& noise : workflow::NoiseNames()) help += "\n" + noise.name + ": " + noise.meaning;
+  for (const workflow::FaultName& noise : workflow::FaultNames()) help += "\n" + noise.name + ": " + noise.meaning;
   return help;
 }
 
@@ -130,7 +130,7 @@ void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = ParseJobs(flags.jobs);
   const workflow::Placement placement = workflow::ParsePlacement(flags.placement);
-  workflow::ParseNoise(flags.noise);  // an unknown name fails before the contact map is built
+  workflow::ParseFaults(flags.noise);  // an unknown name fails before the contact map is built
 
   std::shared_ptr<policies::Database> database;
   if (!flags.db.empty()) {

@@ -1,11 +1,11 @@
-#include "cli/session.h"
+#include "feeler/cli/session.h"
 
 #include <unistd.h>
 
 #include <filesystem>
 #include <iostream>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::cli {
 

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/progress.h"
+#include "feeler/core/progress.h"
 
 namespace feeler::cli {
 

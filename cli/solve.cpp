@@ -6,15 +6,15 @@
 #include <memory>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/policy_output.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "planner/belief/lattice_problem.h"
-#include "planner/preprocess/problem_family.h"
-#include "policies/formats/lattice_problem_file.h"
-#include "workflow/database_builder.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/policy_output.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/policies/io/lattice_problem_file.h"
+#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {

@@ -1,9 +1,9 @@
-#include "cli/solver_flags.h"
+#include "feeler/cli/solver_flags.h"
 
 #include <array>
 #include <cmath>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::cli {
 namespace {

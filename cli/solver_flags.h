@@ -3,10 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "core/parallelism.h"
-#include "env/contact_map_builder.h"
-#include "planner/solver/options.h"
-#include "planner/solver/solve.h"
+#include "feeler/core/parallelism.h"
+#include "feeler/env/contact/contact_map_builder.h"
+#include "feeler/planner/options/solver_options.h"
+#include "feeler/planner/solve.h"
 
 namespace feeler::cli {
 

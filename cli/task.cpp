@@ -9,16 +9,16 @@
 #include <numbers>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/progress_bar.h"
-#include "cli/solver_flags.h"
-#include "core/error.h"
-#include "env/axis_visibility.h"
-#include "env/image.h"
-#include "env/pipe_parts.h"
-#include "env/renderer.h"
-#include "env/scene.h"
-#include "workflow/planning_setup.h"
+#include "feeler/cad/pipe_parts.h"
+#include "feeler/cli/commands.h"
+#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/solver_flags.h"
+#include "feeler/core/error.h"
+#include "feeler/env/contact/axis_visibility.h"
+#include "feeler/env/scene/scene.h"
+#include "feeler/env/vision/image.h"
+#include "feeler/env/vision/renderer.h"
+#include "feeler/workflow/setup/planning_setup.h"
 
 namespace feeler::cli {
 namespace {
@@ -174,11 +174,11 @@ void Render(const Flags& flags) {
   env::WritePng(env::RenderSceneImage(scene, view), flags.out);
 }
 
-void MakePipeParts(const env::PipeParameters& parameters, const std::string& folder) {
+void MakePipeParts(const cad::PipeParameters& parameters, const std::string& folder) {
   if (!std::filesystem::is_directory(folder)) {
     throw InputError("--out", "\"" + folder + "\" is not a folder", "make it first");
   }
-  for (const env::PartFile& part : env::GeneratePipeParts(parameters)) {
+  for (const cad::PartFile& part : cad::GeneratePipeParts(parameters)) {
     const std::string path = (std::filesystem::path(folder) / part.name).string();
     std::ofstream file(path);
     file << part.text;
@@ -220,7 +220,7 @@ void AddTaskCommand(CLI::App& app, Session& /*session*/) {
 
   CLI::App* pipes =
       task->add_subcommand("make-pipe-parts", "Writes the parts of pipes and elbows from sizes in metres");
-  auto sizes = std::make_shared<env::PipeParameters>();
+  auto sizes = std::make_shared<cad::PipeParameters>();
   const auto size = [&](const char* name, double& value, const char* help) {
     pipes->add_option(name, value, help)->capture_default_str();
   };

@@ -1,7 +1,13 @@
 # Helpers that turn folders into targets.
 
 add_library(feeler_options INTERFACE)
-target_include_directories(feeler_options INTERFACE ${CMAKE_SOURCE_DIR})
+# Headers are spelled "feeler/ROOM/..." in the tree as where they are installed: the build tree holds a folder `feeler` with
+# a link to each room.
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/feeler)
+foreach(room core planner policies execution env cad perception workflow evaluation cli)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${room} ${PROJECT_BINARY_DIR}/include/feeler/${room} SYMBOLIC)
+endforeach()
+target_include_directories(feeler_options INTERFACE ${PROJECT_BINARY_DIR}/include)
 target_compile_options(feeler_options INTERFACE -Wall -Wextra -Wshadow -Wpedantic -ffp-contract=off)
 target_compile_definitions(feeler_options INTERFACE FEELER_VERSION="${PROJECT_VERSION}")
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
@@ -21,7 +27,7 @@ endif()
 
 # feeler_room(NAME DEPENDENCY...): target feeler::NAME from the sources in the folder NAME (main.cpp excepted).
 function(feeler_room name)
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${name}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${name}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
   if(sources)
     add_library(feeler_${name} STATIC ${sources})
@@ -35,13 +41,14 @@ endfunction()
 
 # feeler_tests(ROOM): executable ROOM_tests from tests/ROOM/*.cpp, each test registered with ctest.
 function(feeler_tests room)  # the tests of `cli` run the binary
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/${room}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${room}/*.cpp)
   if(NOT sources)
     return()
   endif()
   add_executable(${room}_tests ${sources})
   target_link_libraries(${room}_tests PRIVATE feeler::${room} GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${CMAKE_SOURCE_DIR}" FEELER_BINARY="${CMAKE_BINARY_DIR}/feeler")
+  target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
+  target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")
   # A test is compiled more often than its own code runs long; what it tests is in the rooms, optimised in full.
   target_compile_options(${room}_tests PRIVATE $<$<CONFIG:Release>:-O1>)
   if(room STREQUAL cli)

@@ -1,4 +1,4 @@
-#include "core/direction.h"
+#include "feeler/core/direction.h"
 
 namespace feeler {
 namespace {

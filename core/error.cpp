@@ -1,4 +1,4 @@
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler {
 namespace {

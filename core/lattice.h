@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "core/direction.h"
+#include "feeler/core/direction.h"
 
 namespace feeler {
 

@@ -1,4 +1,4 @@
-#include "core/orientation_lattice.h"
+#include "feeler/core/orientation_lattice.h"
 
 #include <cassert>
 

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "core/task.h"
+#include "feeler/core/task.h"
 
 namespace feeler {
 

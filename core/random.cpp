@@ -1,4 +1,4 @@
-#include "core/random.h"
+#include "feeler/core/random.h"
 
 #include <bit>
 #include <cassert>

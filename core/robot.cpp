@@ -1,4 +1,4 @@
-#include "core/robot.h"
+#include "feeler/core/robot.h"
 
 namespace feeler {
 

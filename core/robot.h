@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/pose.h"
+#include "feeler/core/pose.h"
 
 namespace feeler {
 
@@ -86,7 +86,7 @@ class Robot {
   virtual MotionResult Transfer(const Pose& world_T_tool) = 0;
   /// Straight Cartesian motion to a pose, fast, watched for contact all the way.
   virtual MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) = 0;
-  virtual MotionResult GuardedMove(const GuardedMotion& motion) = 0;
+  virtual MotionResult Guarded(const GuardedMotion& motion) = 0;
   virtual MotionResult Compliant(const CompliantMotion& motion) = 0;
 
   // Robots with an eye on the wrist. Without one: an empty view, and no motion (kUnplanned).

@@ -1,4 +1,4 @@
-#include "core/task.h"
+#include "feeler/core/task.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -37,32 +37,32 @@ double InsertionAngle(const Task& task, const Eigen::Matrix3d& rotation) {
   return std::atan2(axis.cross(turned).norm(), axis.dot(turned));
 }
 
-Cell CuboidOf(const Task& task, const std::vector<int>& extents) {
-  Cell cuboid = Cell::Ones();
+Cell PositionExtents(const Task& task, const std::vector<int>& extents) {
+  Cell along = Cell::Ones();
   for (std::size_t i = 0; i < task.axes.size() && i < extents.size(); ++i) {
-    if (!task.axes[i].angular()) cuboid[static_cast<int>(task.axes[i].kind)] = extents[i];
+    if (!task.axes[i].angular()) along[static_cast<int>(task.axes[i].kind)] = extents[i];
   }
-  return cuboid;
+  return along;
 }
 
-Cell LargestCuboid(const Task& task) {
+Cell LargestPositionExtents(const Task& task) {
   std::vector<int> extents;
   for (const UncertainAxis& axis : task.axes) extents.push_back(axis.max_cells);
-  return CuboidOf(task, extents);
+  return PositionExtents(task, extents);
 }
 
-Cell StartCell(const Task& task, const Cell& cuboid) {
+Cell StartCell(const Task& task, const Cell& extents) {
   // The small number keeps a whole number of cells whole when the division rounds down.
   Cell start;
   for (int axis = 0; axis < 3; ++axis) {
     start[axis] =
-        static_cast<int>(std::floor((cuboid[axis] - 1) / 2.0 + task.start_offset_m[axis] / task.cell_m + 1e-9));
+        static_cast<int>(std::floor((extents[axis] - 1) / 2.0 + task.start_offset_m[axis] / task.cell_m + 1e-9));
   }
   return start;
 }
 
-CellBox WorkspaceCells(const Task& task, const Cell& cuboid) {
-  const Cell start = StartCell(task, cuboid);
+CellBox WorkspaceCells(const Task& task, const Cell& extents) {
+  const Cell start = StartCell(task, extents);
   Cell half;
   Cell center;
   for (int axis = 0; axis < 3; ++axis) {
@@ -78,9 +78,9 @@ CellBox DisplacementsOf(const Task& task) {
   std::vector<int> smaller;
   for (const UncertainAxis& axis : task.axes) smaller.push_back(std::max(axis.min_cells, axis.max_cells - 1));
   CellBox all{Cell::Constant(1 << 28), Cell::Constant(-(1 << 28))};
-  for (const Cell& cuboid : {LargestCuboid(task), CuboidOf(task, smaller)}) {
-    const CellBox workspace = WorkspaceCells(task, cuboid);
-    all.min = all.min.cwiseMin(workspace.min - (cuboid - Cell::Ones()));
+  for (const Cell& extents : {LargestPositionExtents(task), PositionExtents(task, smaller)}) {
+    const CellBox workspace = WorkspaceCells(task, extents);
+    all.min = all.min.cwiseMin(workspace.min - (extents - Cell::Ones()));
     all.max = all.max.cwiseMax(workspace.max);
   }
   return all;

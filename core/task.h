@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/direction.h"
-#include "core/lattice.h"
-#include "core/pose.h"
+#include "feeler/core/direction.h"
+#include "feeler/core/lattice.h"
+#include "feeler/core/pose.h"
 
 namespace feeler {
 
@@ -96,14 +96,14 @@ double InsertionAngle(const Task& task, const Eigen::Matrix3d& rotation);
 
 /// Number of hypotheses along x, y and z at the extents given for the uncertain axes of the task (1 along a certain
 /// axis), in the order of task.axes. Angular axes do not count.
-Cell CuboidOf(const Task& task, const std::vector<int>& extents);
-/// The largest cuboid of hypotheses of the task.
-Cell LargestCuboid(const Task& task);
-/// Lattice cell of the tool at the start pose of a problem with a cuboid of `cuboid` hypotheses:
+Cell PositionExtents(const Task& task, const std::vector<int>& extents);
+/// The largest of them.
+Cell LargestPositionExtents(const Task& task);
+/// Lattice cell of the tool at the start pose of a problem with `extents` hypotheses:
 /// floor((n - 1)/2 + start_offset/cell) per axis.
-Cell StartCell(const Task& task, const Cell& cuboid);
+Cell StartCell(const Task& task, const Cell& extents);
 /// The cells that the tool may be in for that problem: workspace_m around the start cell, moved by workspace_center_m.
-CellBox WorkspaceCells(const Task& task, const Cell& cuboid);
+CellBox WorkspaceCells(const Task& task, const Cell& extents);
 /// Every displacement r - h that some problem of the task can meet.
 CellBox DisplacementsOf(const Task& task);
 

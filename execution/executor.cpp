@@ -1,12 +1,12 @@
-#include "execution/executor.h"
+#include "feeler/execution/executor.h"
 
 #include <exception>
 #include <string>
 
-#include "core/error.h"
-#include "execution/attempt.h"
-#include "execution/fallback_ladder.h"
-#include "execution/pose_attempt.h"
+#include "feeler/core/error.h"
+#include "feeler/execution/lattice/attempt.h"
+#include "feeler/execution/pose/pose_attempt.h"
+#include "feeler/execution/recovery/fallback_ladder.h"
 
 namespace feeler::execution {
 namespace {
@@ -20,7 +20,7 @@ void Check(const Task& task, const planner::Problem& problem) {
 
 }  // namespace
 
-Pose StartPose(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
+Pose LatticeStartPose(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
   Check(task, problem);
   return FrameOf(task, problem, world_T_estimate).ToWorld(problem.start.cast<double>() + problem.map->phase());
 }

@@ -1,12 +1,12 @@
 #pragma once
 
-#include "core/pose.h"
-#include "core/robot.h"
-#include "core/task.h"
-#include "execution/execution_record.h"
-#include "execution/executor_options.h"
-#include "planner/belief/problem.h"
-#include "policies/policy.h"
+#include "feeler/core/pose.h"
+#include "feeler/core/robot.h"
+#include "feeler/core/task.h"
+#include "feeler/execution/contact/execution_record.h"
+#include "feeler/execution/contact/executor_options.h"
+#include "feeler/planner/belief/problem.h"
+#include "feeler/policies/policy.h"
 
 namespace feeler::execution {
 
@@ -24,6 +24,6 @@ ExecutionRecord Execute(const Task& task, const planner::Problem& problem, const
                         policies::Policy& policy, Robot& robot, const ExecutorOptions& options = {});
 
 /// Where the tool stands at the start of `problem` (world pose).
-Pose StartPose(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate);
+Pose LatticeStartPose(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate);
 
 }  // namespace feeler::execution

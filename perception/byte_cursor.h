@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::perception {
 

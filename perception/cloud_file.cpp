@@ -1,4 +1,4 @@
-#include "perception/cloud_file.h"
+#include "feeler/perception/cloud_file.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "perception/byte_cursor.h"
-#include "perception/input_file.h"
+#include "feeler/perception/byte_cursor.h"
+#include "feeler/perception/input_file.h"
 
 namespace feeler::perception {
 namespace {

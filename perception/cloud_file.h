@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "perception/point_cloud.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

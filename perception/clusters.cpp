@@ -1,4 +1,4 @@
-#include "perception/clusters.h"
+#include "feeler/perception/clusters.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-#include "perception/nearest_points.h"
+#include "feeler/perception/nearest_points.h"
 
 namespace feeler::perception {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "perception/point_cloud.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

@@ -1,4 +1,4 @@
-#include "perception/depth_file.h"
+#include "feeler/perception/depth_file.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <opencv2/imgcodecs.hpp>
 
-#include "core/error.h"
-#include "perception/input_file.h"
+#include "feeler/core/error.h"
+#include "feeler/perception/input_file.h"
 
 namespace feeler::perception {
 namespace {

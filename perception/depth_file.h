@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/pose.h"
-#include "perception/point_cloud.h"
+#include "feeler/core/pose.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

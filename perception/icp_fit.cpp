@@ -1,4 +1,4 @@
-#include "perception/icp_fit.h"
+#include "feeler/perception/icp_fit.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/pose.h"
-#include "perception/nearest_points.h"
-#include "perception/point_cloud.h"
-#include "perception/registration.h"
+#include "feeler/core/pose.h"
+#include "feeler/perception/nearest_points.h"
+#include "feeler/perception/point_cloud.h"
+#include "feeler/perception/registration.h"
 
 namespace feeler::perception {
 

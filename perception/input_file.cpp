@@ -1,4 +1,4 @@
-#include "perception/input_file.h"
+#include "feeler/perception/input_file.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::perception {
 namespace {

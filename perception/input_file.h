@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/pose.h"
+#include "feeler/core/pose.h"
 
 namespace feeler::perception {
 

@@ -1,4 +1,4 @@
-#include "perception/nearest_points.h"
+#include "feeler/perception/nearest_points.h"
 
 #include <nanoflann.hpp>
 #include <utility>

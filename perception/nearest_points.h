@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "perception/point_cloud.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

@@ -1,4 +1,4 @@
-#include "perception/point_cloud.h"
+#include "feeler/perception/point_cloud.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "perception/registration.h"
+#include "feeler/perception/registration.h"
 
 #include <fmt/format.h>
 
@@ -11,9 +11,9 @@
 #include <tuple>
 #include <utility>
 
-#include "core/error.h"
-#include "perception/clusters.h"
-#include "perception/icp_fit.h"
+#include "feeler/core/error.h"
+#include "feeler/perception/clusters.h"
+#include "feeler/perception/icp_fit.h"
 
 namespace feeler::perception {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/pose.h"
-#include "perception/nearest_points.h"
-#include "perception/point_cloud.h"
+#include "feeler/core/pose.h"
+#include "feeler/perception/nearest_points.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

@@ -1,4 +1,4 @@
-#include "perception/uncertainty_table.h"
+#include "feeler/perception/uncertainty_table.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::perception {
 namespace {

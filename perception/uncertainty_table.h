@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "core/pose.h"
-#include "core/task.h"
+#include "feeler/core/pose.h"
+#include "feeler/core/task.h"
 
 namespace feeler::perception {
 
@@ -33,7 +33,7 @@ struct UncertaintyTable {
   static constexpr int kVersion = 1;
 
   std::string task;
-  std::string fingerprint;  ///< of the task (env/fingerprint.h)
+  std::string fingerprint;  ///< of the task (env/model/fingerprint.h)
   std::vector<UncertainAxis> axes;
   Eigen::Vector3d camera_m = Eigen::Vector3d::Zero();  ///< where the camera stands, world
   int averaged_frames = 1;

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/error.h"
-#include "perception/input_file.h"
-#include "perception/uncertainty_table.h"
+#include "feeler/core/error.h"
+#include "feeler/perception/input_file.h"
+#include "feeler/perception/uncertainty_table.h"
 
 namespace feeler::perception {
 namespace {

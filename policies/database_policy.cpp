@@ -1,13 +1,13 @@
-#include "policies/database_policy.h"
+#include "feeler/policies/database_policy.h"
 
 #include <string>
 #include <utility>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::policies {
 
-DatabasePolicy::DatabasePolicy(std::shared_ptr<const planner::Policy> policy) : policy_(std::move(policy)) {
+DatabasePolicy::DatabasePolicy(std::shared_ptr<const planner::PolicyGraph> policy) : policy_(std::move(policy)) {
   if (!policy_ || policy_->root >= policy_->nodes.size()) {
     throw InputError("policy", "the graph has no root", "solve the problem again");
   }

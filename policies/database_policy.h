@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "planner/solver/policy.h"
-#include "policies/policy.h"
+#include "feeler/planner/policy/policy_graph.h"
+#include "feeler/policies/policy.h"
 
 namespace feeler::policies {
 
@@ -14,7 +14,7 @@ namespace feeler::policies {
 class DatabasePolicy final : public Policy {
  public:
   /// Throws InputError unless every node index lies in the graph and the root exists.
-  explicit DatabasePolicy(std::shared_ptr<const planner::Policy> policy);
+  explicit DatabasePolicy(std::shared_ptr<const planner::PolicyGraph> policy);
 
   std::string_view name() const override { return "database"; }
   void Begin(const planner::Problem& problem) override;
@@ -28,7 +28,7 @@ class DatabasePolicy final : public Policy {
   std::vector<Hypothesis> LeafHypotheses() const;
 
  private:
-  std::shared_ptr<const planner::Policy> policy_;
+  std::shared_ptr<const planner::PolicyGraph> policy_;
   std::uint32_t node_ = 0;
   Cell shift_ = Cell::Zero();
   std::size_t depth_ = 0;

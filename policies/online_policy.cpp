@@ -1,15 +1,15 @@
-#include "policies/online_policy.h"
+#include "feeler/policies/online_policy.h"
 
 #include <cassert>
 #include <cmath>
 #include <utility>
 
-#include "core/error.h"
-#include "planner/solver/solve.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/solve.h"
 
 namespace feeler::policies {
 
-OnlinePolicy::OnlinePolicy(const OnlineOptions& options, std::shared_ptr<PlanningTablesCache> tables)
+OnlinePolicy::OnlinePolicy(const OnlineOptions& options, std::shared_ptr<planner::PlanningTablesCache> tables)
     : options_(options), tables_(std::move(tables)) {
   if (!(std::isfinite(options.time_limit_s) && options.time_limit_s > 0.0)) {
     throw InputError("online", "the time limit is not positive", "give seconds per step");
@@ -41,7 +41,7 @@ void OnlinePolicy::Plan(const Belief& belief) {
   const planner::SolverResult result = planner::Solve(here, options, tables_->TablesFor(*problem_, options));
   if (!result.policy) return;
   if (plan_ && plan_->node().expected_cost <= result.expected_cost) return;
-  plan_.emplace(std::make_shared<const planner::Policy>(*result.policy));
+  plan_.emplace(std::make_shared<const planner::PolicyGraph>(*result.policy));
   plan_->Begin(here);
   certified_ = result.status == planner::SolverStatus::kGap || result.status == planner::SolverStatus::kConverged;
 }

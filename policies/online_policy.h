@@ -5,10 +5,10 @@
 #include <optional>
 #include <string_view>
 
-#include "planner/solver/policy.h"
-#include "policies/database_policy.h"
-#include "policies/planning_tables_cache.h"
-#include "policies/policy.h"
+#include "feeler/planner/bounds/planning_tables_cache.h"
+#include "feeler/planner/policy/policy_graph.h"
+#include "feeler/policies/database_policy.h"
+#include "feeler/policies/policy.h"
 
 namespace feeler::policies {
 
@@ -26,7 +26,7 @@ struct OnlineOptions {
 class OnlinePolicy final : public Policy {
  public:
   /// `tables` are shared by all policies for a contact map. Throws InputError for a budget that is not positive.
-  OnlinePolicy(const OnlineOptions& options, std::shared_ptr<PlanningTablesCache> tables);
+  OnlinePolicy(const OnlineOptions& options, std::shared_ptr<planner::PlanningTablesCache> tables);
 
   std::string_view name() const override { return "online"; }
   void Begin(const planner::Problem& problem) override;
@@ -37,7 +37,7 @@ class OnlinePolicy final : public Policy {
   void Plan(const Belief& belief);
 
   OnlineOptions options_;
-  std::shared_ptr<PlanningTablesCache> tables_;
+  std::shared_ptr<planner::PlanningTablesCache> tables_;
   const planner::Problem* problem_ = nullptr;
   std::optional<DatabasePolicy> plan_;  ///< the policy followed, at its present node
   bool certified_ = false;

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "policies/policy.h"
+#include "feeler/policies/policy.h"
 
 namespace feeler::policies {
 

@@ -6,9 +6,9 @@
 #include <variant>
 #include <vector>
 
-#include "core/lattice.h"
-#include "core/robot.h"
-#include "planner/belief/problem.h"
+#include "feeler/core/lattice.h"
+#include "feeler/core/robot.h"
+#include "feeler/planner/belief/problem.h"
 
 namespace feeler::policies {
 

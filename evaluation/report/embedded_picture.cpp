@@ -1,4 +1,4 @@
-#include "evaluation/report/embedded_picture.h"
+#include "feeler/evaluation/report/embedded_picture.h"
 
 #include <cstdint>
 #include <fstream>
@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "evaluation/replay_json.h"
+#include "feeler/evaluation/records/replay_json.h"
 
 namespace feeler::evaluation {
 

@@ -1,4 +1,4 @@
-#include "evaluation/report/page.h"
+#include "feeler/evaluation/report/page.h"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,11 @@
 #include <set>
 #include <string_view>
 
-#include "core/error.h"
-#include "env/scene.h"
-#include "env/task_file.h"
-#include "evaluation/experiments/paper_results.h"
-#include "evaluation/report/scene_geometry.h"
+#include "feeler/core/error.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/scene/scene.h"
+#include "feeler/evaluation/harness/paper_results.h"
+#include "feeler/evaluation/records/scene_geometry.h"
 
 namespace feeler::evaluation {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/report/results_folder.h"
+#include "feeler/evaluation/report/results_folder.h"
 
 namespace feeler::evaluation {
 

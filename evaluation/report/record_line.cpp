@@ -1,4 +1,4 @@
-#include "evaluation/report/record_line.h"
+#include "feeler/evaluation/report/record_line.h"
 
 #include <cmath>
 #include <stdexcept>

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "evaluation/report/results_folder.h"
+#include "feeler/evaluation/report/results_folder.h"
 
 namespace feeler::evaluation {
 

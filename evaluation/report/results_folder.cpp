@@ -1,4 +1,4 @@
-#include "evaluation/report/results_folder.h"
+#include "feeler/evaluation/report/results_folder.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/error.h"
-#include "evaluation/experiment_output.h"
-#include "evaluation/report/embedded_picture.h"
-#include "evaluation/report/record_line.h"
+#include "feeler/core/error.h"
+#include "feeler/evaluation/harness/experiment_output.h"
+#include "feeler/evaluation/report/embedded_picture.h"
+#include "feeler/evaluation/report/record_line.h"
 
 namespace feeler::evaluation {
 namespace {

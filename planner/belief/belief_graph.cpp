@@ -1,4 +1,4 @@
-#include "planner/belief/belief_graph.h"
+#include "feeler/planner/belief/belief_graph.h"
 
 #include <algorithm>
 #include <cassert>

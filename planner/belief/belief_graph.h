@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "planner/belief/contact_masks.h"
-#include "planner/belief/hypothesis_sets.h"
-#include "planner/belief/problem.h"
-#include "planner/heuristic/belief_heuristic.h"
+#include "feeler/planner/belief/belief_heuristic.h"
+#include "feeler/planner/belief/contact_masks.h"
+#include "feeler/planner/belief/hypothesis_sets.h"
+#include "feeler/planner/belief/problem.h"
 
 namespace feeler::planner {
 

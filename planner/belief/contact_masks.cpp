@@ -1,4 +1,4 @@
-#include "planner/belief/contact_masks.h"
+#include "feeler/planner/belief/contact_masks.h"
 
 #include <unordered_map>
 

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/direction.h"
-#include "core/lattice.h"
-#include "planner/belief/bits256.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/direction.h"
+#include "feeler/core/lattice.h"
+#include "feeler/planner/belief/bits256.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 

@@ -1,4 +1,4 @@
-#include "planner/belief/hypothesis_sets.h"
+#include "feeler/planner/belief/hypothesis_sets.h"
 
 #include <algorithm>
 #include <array>

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "core/lattice.h"
-#include "planner/belief/bits256.h"
-#include "planner/belief/problem.h"
+#include "feeler/core/lattice.h"
+#include "feeler/planner/belief/bits256.h"
+#include "feeler/planner/belief/problem.h"
 
 namespace feeler::planner {
 

@@ -1,10 +1,10 @@
-#include "planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/lattice_problem.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::planner {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "planner/belief/problem.h"
+#include "feeler/planner/belief/problem.h"
 
 namespace feeler::planner {
 

@@ -1,4 +1,4 @@
-#include "planner/belief/problem.h"
+#include "feeler/planner/belief/problem.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::planner {
 namespace {

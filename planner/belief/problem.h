@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "core/lattice.h"
-#include "core/task.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/lattice.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 

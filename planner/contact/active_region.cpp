@@ -1,4 +1,4 @@
-#include "planner/contact/active_region.h"
+#include "feeler/planner/contact/active_region.h"
 
 #include <algorithm>
 

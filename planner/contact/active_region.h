@@ -3,9 +3,9 @@
 #include <array>
 #include <cstdint>
 
-#include "core/direction.h"
-#include "core/lattice.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/direction.h"
+#include "feeler/core/lattice.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 

@@ -1,10 +1,10 @@
-#include "planner/contact/contact_map.h"
+#include "feeler/planner/contact/contact_map.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::planner {
 

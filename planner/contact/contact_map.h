@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/direction.h"
-#include "core/lattice.h"
+#include "feeler/core/direction.h"
+#include "feeler/core/lattice.h"
 
 namespace feeler::planner {
 

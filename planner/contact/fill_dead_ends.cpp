@@ -1,4 +1,4 @@
-#include "planner/contact/fill_dead_ends.h"
+#include "feeler/planner/contact/fill_dead_ends.h"
 
 #include <algorithm>
 #include <utility>

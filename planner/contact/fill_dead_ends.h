@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "planner/contact/contact_map.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 

@@ -3,13 +3,13 @@
 #include <memory>
 #include <utility>
 
-#include "core/lattice.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/lattice.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 
 /// What a guarded move would return under a hypothesis: read from the contact map, or computed by collision checks of
-/// the meshes (env/mesh_outcomes.h). One thread at a time.
+/// the meshes (env/contact/mesh_outcomes.h). One thread at a time.
 class OutcomeModel {
  public:
   virtual ~OutcomeModel() = default;

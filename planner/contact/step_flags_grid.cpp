@@ -1,4 +1,4 @@
-#include "planner/contact/step_flags_grid.h"
+#include "feeler/planner/contact/step_flags_grid.h"
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/parallelism.h"
-#include "planner/contact/active_region.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/parallelism.h"
+#include "feeler/planner/contact/active_region.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
 

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/direction.h"
-#include "core/pose.h"
+#include "feeler/core/direction.h"
+#include "feeler/core/pose.h"
 
 namespace feeler::planner {
 
@@ -15,7 +15,7 @@ struct ToolMotion {
 };
 
 /// Where the tool meets a target of any pose: what a contact map is between its lattice points and orientations.
-/// Implemented by the geometry of the task (env/exact_travel.h). One thread at a time.
+/// Implemented by the geometry of the task (planner/contact/exact_travel.h). One thread at a time.
 class TravelModel {
  public:
   /// Travel of a motion that meets nothing, m.

@@ -1,4 +1,4 @@
-#include "policies/storage/database.h"
+#include "feeler/policies/storage/database.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -9,14 +9,14 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/error.h"
-#include "policies/formats/bytes.h"
-#include "policies/storage/file_checks.h"
-#include "policies/storage/hash.h"
-#include "policies/storage/meta.h"
-#include "policies/storage/row.h"
-#include "policies/storage/row_sql.h"
-#include "policies/storage/writer_lock.h"
+#include "feeler/core/error.h"
+#include "feeler/policies/io/bytes.h"
+#include "feeler/policies/storage/file_checks.h"
+#include "feeler/policies/storage/hash.h"
+#include "feeler/policies/storage/meta.h"
+#include "feeler/policies/storage/row.h"
+#include "feeler/policies/storage/row_sql.h"
+#include "feeler/policies/storage/writer_lock.h"
 
 namespace feeler::policies {
 

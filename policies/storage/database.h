@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/task.h"
-#include "planner/preprocess/problem_family.h"
-#include "planner/solver/policy.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/policy/policy_graph.h"
 
 namespace feeler::policies {
 
@@ -40,9 +40,9 @@ struct StoredProblem {
   double lower_bound = 0.0;                                        ///< proven
   std::int64_t expansions = 0;
   std::uint64_t seed = 0;
-  std::string version;                    ///< of feeler that solved it
-  std::optional<planner::Policy> policy;  ///< complete policy, if there is one
-  double cpu_s = 0.0;                     ///< measured; stands in a table of its own and is no part of the content
+  std::string version;                         ///< of feeler that solved it
+  std::optional<planner::PolicyGraph> policy;  ///< complete policy, if there is one
+  double cpu_s = 0.0;                          ///< measured; stands in a table of its own and is no part of the content
   double wall_s = 0.0;
 
   /// Expected cost / lower bound; 1 if both are zero; infinity without a policy or a bound.

@@ -1,4 +1,4 @@
-#include "policies/storage/database_sink.h"
+#include "feeler/policies/storage/database_sink.h"
 
 #include <algorithm>
 #include <utility>
@@ -10,7 +10,7 @@ bool DatabaseSink::Done(const planner::Extents& extents) {
   return stored && (stored->policy || stored->status == ToString(planner::SolverStatus::kUnlocalizable));
 }
 
-std::optional<planner::Policy> DatabaseSink::Load(const planner::Extents& extents) {
+std::optional<planner::PolicyGraph> DatabaseSink::Load(const planner::Extents& extents) {
   auto stored = database_.Get(extents);
   return stored ? std::move(stored->policy) : std::nullopt;
 }

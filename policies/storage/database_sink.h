@@ -2,9 +2,9 @@
 
 #include <optional>
 
-#include "planner/preprocess/preprocess.h"
-#include "planner/solver/options.h"
-#include "policies/storage/database.h"
+#include "feeler/planner/family/preprocess.h"
+#include "feeler/planner/options/solver_options.h"
+#include "feeler/policies/storage/database.h"
 
 namespace feeler::policies {
 
@@ -16,7 +16,7 @@ class DatabaseSink final : public planner::PolicySink {
   DatabaseSink(Database& database, const planner::SolverOptions& options) : database_(database), options_(options) {}
 
   bool Done(const planner::Extents& extents) override;
-  std::optional<planner::Policy> Load(const planner::Extents& extents) override;
+  std::optional<planner::PolicyGraph> Load(const planner::Extents& extents) override;
   void Store(const planner::Extents& extents, const planner::Problem& problem,
              const planner::SolverResult& result) override;
 

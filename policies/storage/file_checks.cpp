@@ -1,4 +1,4 @@
-#include "policies/storage/file_checks.h"
+#include "feeler/policies/storage/file_checks.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -8,7 +8,7 @@
 #include <map>
 #include <thread>
 
-#include "policies/storage/database.h"
+#include "feeler/policies/storage/database.h"
 
 namespace feeler::policies {
 namespace {

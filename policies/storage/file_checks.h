@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string>
 
-#include "core/error.h"
-#include "policies/storage/schema.h"
-#include "policies/storage/sqlite.h"
+#include "feeler/core/error.h"
+#include "feeler/policies/storage/schema.h"
+#include "feeler/policies/storage/sqlite.h"
 
 namespace feeler::policies {
 

@@ -1,4 +1,4 @@
-#include "policies/storage/hash.h"
+#include "feeler/policies/storage/hash.h"
 
 #include <fmt/format.h>
 

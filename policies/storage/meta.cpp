@@ -1,4 +1,4 @@
-#include "policies/storage/meta.h"
+#include "feeler/policies/storage/meta.h"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "core/error.h"
-#include "policies/formats/bytes.h"
-#include "policies/storage/file_checks.h"
-#include "policies/storage/hash.h"
+#include "feeler/core/error.h"
+#include "feeler/policies/io/bytes.h"
+#include "feeler/policies/storage/file_checks.h"
+#include "feeler/policies/storage/hash.h"
 
 namespace feeler::policies {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "policies/storage/database.h"
-#include "policies/storage/sqlite.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/policies/storage/sqlite.h"
 
 namespace feeler::policies {
 

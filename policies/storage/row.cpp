@@ -1,13 +1,13 @@
-#include "policies/storage/row.h"
+#include "feeler/policies/storage/row.h"
 
 #include <bit>
 #include <cmath>
 #include <stdexcept>
 
-#include "core/error.h"
-#include "policies/formats/bytes.h"
-#include "policies/formats/policy_blob.h"
-#include "policies/storage/hash.h"
+#include "feeler/core/error.h"
+#include "feeler/policies/io/bytes.h"
+#include "feeler/policies/io/policy_blob.h"
+#include "feeler/policies/storage/hash.h"
 
 namespace feeler::policies {
 namespace {

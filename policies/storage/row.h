@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "policies/storage/database.h"
+#include "feeler/policies/storage/database.h"
 
 namespace feeler::policies {
 

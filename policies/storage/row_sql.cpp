@@ -1,10 +1,10 @@
-#include "policies/storage/row_sql.h"
+#include "feeler/policies/storage/row_sql.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "policies/storage/file_checks.h"
+#include "feeler/policies/storage/file_checks.h"
 
 namespace feeler::policies {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
-#include "policies/storage/row.h"
-#include "policies/storage/sqlite.h"
+#include "feeler/policies/storage/row.h"
+#include "feeler/policies/storage/sqlite.h"
 
 namespace feeler::policies {
 

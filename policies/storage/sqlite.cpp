@@ -1,4 +1,4 @@
-#include "policies/storage/sqlite.h"
+#include "feeler/policies/storage/sqlite.h"
 
 #include <sys/stat.h>
 

@@ -1,12 +1,12 @@
-#include "policies/storage/verify.h"
+#include "feeler/policies/storage/verify.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "planner/solver/evaluate.h"
-#include "policies/formats/policy_check.h"
+#include "feeler/planner/policy/evaluate.h"
+#include "feeler/policies/io/policy_check.h"
 
 namespace feeler::policies {
 namespace {
@@ -16,7 +16,7 @@ constexpr double kTolerance = 1e-9;
 bool Agree(double a, double b) { return std::abs(a - b) <= kTolerance * std::max(1.0, std::abs(b)); }
 
 /// The first node whose cost to go is not the mean over its branches of the move's cost and the successor's.
-std::string FindCostFault(const planner::Policy& policy, const CostWeights& cost) {
+std::string FindCostFault(const planner::PolicyGraph& policy, const CostWeights& cost) {
   for (std::size_t i = 0; i < policy.nodes.size(); ++i) {
     const planner::PolicyNode& node = policy.nodes[i];
     double expected = 0.0;
@@ -35,7 +35,7 @@ std::string FindCostFault(const planner::Policy& policy, const CostWeights& cost
 RowVerification VerifyRow(const StoredProblem& row, const planner::Problem& problem) {
   RowVerification verification;
   if (!row.policy) return verification;
-  const planner::Policy& policy = *row.policy;
+  const planner::PolicyGraph& policy = *row.policy;
   if (const auto fault = FindPolicyFault(policy)) {
     verification.fault = *fault;
     return verification;

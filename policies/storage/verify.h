@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "planner/belief/problem.h"
-#include "policies/storage/database.h"
+#include "feeler/planner/belief/problem.h"
+#include "feeler/policies/storage/database.h"
 
 namespace feeler::policies {
 

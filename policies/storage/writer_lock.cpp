@@ -1,4 +1,4 @@
-#include "policies/storage/writer_lock.h"
+#include "feeler/policies/storage/writer_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/error.h"
+#include "feeler/core/error.h"
 
 namespace feeler::policies {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "env/fingerprint.h"
-#include "env/target_points.h"
-#include "env/task_file.h"
-#include "perception/depth_file.h"
-#include "perception/uncertainty_table.h"
+#include "feeler/env/model/fingerprint.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/vision/target_points.h"
+#include "feeler/perception/depth_file.h"
+#include "feeler/perception/uncertainty_table.h"
 #include "tests/cli/run_feeler.h"
 
 namespace feeler::cli {

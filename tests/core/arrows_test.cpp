@@ -1,13 +1,16 @@
-// Law: a room includes only headers of the rooms it may use (the arrows of the design), and its target links only
-// those.
+// Laws: a room includes only headers of the rooms it may use (the arrows of docs/architecture.md), and its target links
+// only those; inside and between rooms no sub-folders use each other, by whatever detour (the sub-folders form no
+// cycle); every header of ours is spelled "feeler/ROOM/..."; no folder of the product holds more than thirty files.
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace feeler {
 namespace {
@@ -21,46 +24,117 @@ const std::map<std::string, std::set<std::string>>& MayUse() {
       {"policies", {"core", "planner"}},
       {"execution", {"core", "planner", "policies"}},
       {"env", {"core", "planner"}},
+      {"cad", {"core", "planner", "env"}},
       {"perception", {"core", "planner"}},
-      {"workflow", {"core", "planner", "policies", "execution", "env", "perception"}},
-      {"evaluation", {"core", "planner", "policies", "execution", "env", "perception", "workflow"}},
-      {"cli", {"core", "planner", "policies", "execution", "env", "perception", "workflow", "evaluation"}},
+      {"workflow", {"core", "planner", "policies", "execution", "env", "cad", "perception"}},
+      {"evaluation", {"core", "planner", "policies", "execution", "env", "cad", "perception", "workflow"}},
+      {"cli", {"core", "planner", "policies", "execution", "env", "cad", "perception", "workflow", "evaluation"}},
   };
   return kMayUse;
 }
 
-/// The rooms that the quoted includes of a text name.
-std::set<std::string> IncludedRooms(const std::string& text) {
-  static const std::regex kInclude("(^|\n)\\s*#\\s*include\\s*[\"<]([a-z_]+)/");
-  std::set<std::string> rooms;
+/// The headers of ours that a text includes, as they are spelled, e.g. "feeler/env/scene/world.h" or
+/// "env/scene/world.h".
+std::vector<std::string> IncludedHeaders(const std::string& text) {
+  static const std::regex kInclude("(^|\n)[ \t]*#[ \t]*include[ \t]*[\"<]((feeler/)?([a-z_]+)/[^\">]*)");
+  std::vector<std::string> headers;
   for (std::sregex_iterator it(text.begin(), text.end(), kInclude), end; it != end; ++it) {
-    if (MayUse().contains((*it)[2])) rooms.insert((*it)[2]);
+    if ((*it)[3].matched || MayUse().contains((*it)[4])) headers.push_back((*it)[2]);
   }
-  return rooms;
+  return headers;
+}
+
+struct SourceFile {
+  std::string folder;  ///< from the root of the tree: "env/scene"
+  std::string path;
+  std::vector<std::string> headers;
+};
+
+const std::vector<SourceFile>& SourceFiles() {
+  static const std::vector<SourceFile> kFiles = [] {
+    const fs::path root = FEELER_SOURCE_DIR;
+    std::vector<SourceFile> files;
+    for (const auto& [room, unused] : MayUse()) {
+      for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+        const std::string extension = entry.path().extension();
+        if (extension != ".h" && extension != ".cpp") continue;
+        std::ifstream in(entry.path());
+        const std::string text((std::istreambuf_iterator<char>(in)), {});
+        const fs::path relative = fs::relative(entry.path(), root);
+        files.push_back({relative.parent_path(), relative, IncludedHeaders(text)});
+      }
+    }
+    return files;
+  }();
+  return kFiles;
+}
+
+std::string RoomOf(const std::string& folder) { return folder.substr(0, folder.find('/')); }
+/// "feeler/env/scene/world.h" -> "env/scene"
+std::string FolderOf(const std::string& header) {
+  return fs::path(header.substr(std::string("feeler/").size())).parent_path();
+}
+
+/// A cycle in a graph of folders, as "a -> b -> a"; empty if there is none.
+std::string FindCycle(const std::map<std::string, std::set<std::string>>& uses) {
+  std::map<std::string, int> state;  // 1: on the way, 2: done
+  std::vector<std::string> way;
+  std::string cycle;
+  const std::function<void(const std::string&)> visit = [&](const std::string& folder) {
+    if (!cycle.empty() || state[folder] == 2) return;
+    way.push_back(folder);
+    if (state[folder] == 1) {
+      for (const std::string& step : way) cycle += (cycle.empty() ? "" : " -> ") + step;
+      return;
+    }
+    state[folder] = 1;
+    if (const auto it = uses.find(folder); it != uses.end()) {
+      for (const std::string& used : it->second) visit(used);
+    }
+    state[folder] = 2;
+    way.pop_back();
+  };
+  for (const auto& [folder, unused] : uses) visit(folder);
+  return cycle;
 }
 
 TEST(Arrows, ScannerSeesIncludes) {
-  EXPECT_EQ(IncludedRooms("#include \"env/world.h\"\n#include <vector>\n  #include \"core/task.h\"\n"),
-            (std::set<std::string>{"core", "env"}));
+  EXPECT_EQ(IncludedHeaders("#include \"feeler/env/scene/world.h\"\n#include <vector>\n  #  include <core/task.h>\n"),
+            (std::vector<std::string>{"feeler/env/scene/world.h", "core/task.h"}));
+}
+
+TEST(Arrows, ScannerSeesCycles) {
+  EXPECT_EQ(FindCycle({{"a", {"b"}}, {"b", {"c"}}}), "");
+  EXPECT_NE(FindCycle({{"a", {"b"}}, {"b", {"c"}}, {"c", {"a"}}}), "");
 }
 
 TEST(Arrows, RoomsIncludeOnlyWhatTheyMayUse) {
-  const fs::path root = FEELER_SOURCE_DIR;
-  int files = 0;
-  for (const auto& [room, may_use] : MayUse()) {
-    if (!fs::exists(root / room)) continue;
-    for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
-      const std::string extension = entry.path().extension();
-      if (extension != ".h" && extension != ".cpp") continue;
-      ++files;
-      std::ifstream in(entry.path());
-      const std::string text((std::istreambuf_iterator<char>(in)), {});
-      for (const std::string& used : IncludedRooms(text)) {
-        EXPECT_TRUE(used == room || may_use.contains(used)) << entry.path() << " uses " << used;
-      }
+  for (const SourceFile& file : SourceFiles()) {
+    const std::string room = RoomOf(file.folder);
+    for (const std::string& header : file.headers) {
+      ASSERT_TRUE(header.starts_with("feeler/")) << file.path << " spells " << header << " without feeler/";
+      const std::string used = RoomOf(FolderOf(header));
+      EXPECT_TRUE(used == room || MayUse().at(room).contains(used)) << file.path << " uses " << header;
     }
   }
-  EXPECT_GT(files, 20);
+  EXPECT_GT(SourceFiles().size(), 400U);
+}
+
+TEST(Arrows, SubFoldersFormNoCycle) {
+  std::map<std::string, std::set<std::string>> uses;
+  for (const SourceFile& file : SourceFiles()) {
+    for (const std::string& header : file.headers) {
+      if (FolderOf(header) != file.folder) uses[file.folder].insert(FolderOf(header));
+    }
+  }
+  EXPECT_GT(uses.size(), 30U);
+  EXPECT_EQ(FindCycle(uses), "");
+}
+
+TEST(Arrows, NoFolderHoldsMoreThanThirtyFiles) {
+  std::map<std::string, int> count;
+  for (const SourceFile& file : SourceFiles()) ++count[file.folder];
+  for (const auto& [folder, files] : count) EXPECT_LE(files, 30) << folder << " holds several subjects: name them";
 }
 
 TEST(Arrows, LinkLinesFollowTheArrows) {

@@ -1,6 +1,6 @@
 // Laws: a stream is a pure function of (seed, episode, purpose); different keys give different streams; uniforms and
 // normals have their moments.
-#include "core/random.h"
+#include "feeler/core/random.h"
 
 #include <gtest/gtest.h>
 

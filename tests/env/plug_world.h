@@ -6,10 +6,10 @@
 
 #include <memory>
 
-#include "env/control/tool_kinematics.h"
-#include "env/scene.h"
-#include "env/simulated_robot.h"
-#include "env/task_file.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/robot/simulated_robot.h"
+#include "feeler/env/robot/tool_kinematics.h"
+#include "feeler/env/scene/scene.h"
 
 namespace feeler::env {
 

@@ -12,11 +12,11 @@
 #include <set>
 #include <string>
 
-#include "core/error.h"
-#include "evaluation/experiments/bounds.h"
-#include "evaluation/experiments/registry.h"
-#include "evaluation/experiments/table1_plug.h"
-#include "evaluation/experiments/table3_ablation.h"
+#include "feeler/core/error.h"
+#include "feeler/evaluation/paper/table1_plug.h"
+#include "feeler/evaluation/paper/table3_ablation.h"
+#include "feeler/evaluation/registry.h"
+#include "feeler/evaluation/studies/bounds.h"
 #include "tests/planner/synthetic_plug.h"
 
 namespace feeler::evaluation {

@@ -210,7 +210,7 @@ MotionResult KinematicRobot::LinearMove(const Pose& world_T_tool, double speed_m
   return Go(world_T_tool.translation(), speed_m_s, contact_force_n < 1000.0);
 }
 
-MotionResult KinematicRobot::GuardedMove(const GuardedMotion& motion) {
+MotionResult KinematicRobot::Guarded(const GuardedMotion& motion) {
   if (faults_.phantom_contacts > 0) {
     --faults_.phantom_contacts;
     const Eigen::Vector3d half = 0.5 * motion.distance_m * motion.direction;

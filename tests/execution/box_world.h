@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "core/random.h"
-#include "core/robot.h"
-#include "core/task.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/random.h"
+#include "feeler/core/robot.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::execution {
 
@@ -61,7 +61,7 @@ class KinematicRobot : public Robot {
   double Time() const override { return time_s_; }
   MotionResult Transfer(const Pose& world_T_tool) override;
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
-  MotionResult GuardedMove(const GuardedMotion& motion) override;
+  MotionResult Guarded(const GuardedMotion& motion) override;
   MotionResult Compliant(const CompliantMotion& motion) override;
 
   /// In the opening, at depth.

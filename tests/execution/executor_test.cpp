@@ -4,7 +4,7 @@
 // - axes across the insertion are pinned by a contact or known within the confirm limit;
 // - the record is a function of what the robot answers: again the same, and the same in a world moved as a whole;
 // - a failure carries a reason; robots that never move, always feel contact or answer nonsense end with one.
-#include "execution/executor.h"
+#include "feeler/execution/executor.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -16,21 +16,21 @@
 #include <map>
 #include <memory>
 
-#include "core/error.h"
-#include "planner/preprocess/problem_family.h"
-#include "planner/solver/solve.h"
-#include "policies/database_policy.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/solve.h"
+#include "feeler/policies/database_policy.h"
 #include "tests/execution/box_world.h"
 
 namespace feeler::execution {
 namespace {
 
-std::shared_ptr<const planner::Policy> PolicyFor(const planner::Problem& problem) {
+std::shared_ptr<const planner::PolicyGraph> PolicyFor(const planner::Problem& problem) {
   const planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kRtdpBel, 1.2);
   static const auto tables = planner::BuildPlanningTables(problem, options);  // shared: one map, one set of costs
   const planner::SolverResult result = planner::Solve(problem, options, tables);
   if (!result.policy) return nullptr;
-  return std::make_shared<planner::Policy>(*result.policy);
+  return std::make_shared<planner::PolicyGraph>(*result.policy);
 }
 
 struct Episode {
@@ -52,13 +52,13 @@ Pose TruePose(const planner::Problem& problem, const Task& task, const Pose& wor
   return pose;
 }
 
-Episode RunEpisode(const planner::Problem& problem, std::shared_ptr<const planner::Policy> graph, std::uint64_t seed,
-                   std::uint64_t number, const Pose& world_T_estimate = Pose::Identity(),
+Episode RunEpisode(const planner::Problem& problem, std::shared_ptr<const planner::PolicyGraph> graph,
+                   std::uint64_t seed, std::uint64_t number, const Pose& world_T_estimate = Pose::Identity(),
                    const RobotFaults& faults = {}, const ExecutorOptions& options = {}) {
   const Task task = HousingTask();
   RandomStream draw(seed, number, "true pose");
   const Pose truth = TruePose(problem, task, world_T_estimate, draw);
-  KinematicRobot robot(HousingOverPanel(), task, truth, StartPose(task, problem, world_T_estimate), faults,
+  KinematicRobot robot(HousingOverPanel(), task, truth, LatticeStartPose(task, problem, world_T_estimate), faults,
                        RandomStream(seed, number, "robot"));
   policies::DatabasePolicy policy(std::move(graph));
   Episode episode;
@@ -191,7 +191,7 @@ class StubbornRobot : public Robot {
     if (follow_) pose_ = to;
     return Answer();
   }
-  MotionResult GuardedMove(const GuardedMotion& m) override {
+  MotionResult Guarded(const GuardedMotion& m) override {
     if (follow_) pose_.translation() += m.distance_m * m.direction;
     return Answer();
   }
@@ -228,7 +228,8 @@ ExecutionRecord RunStubborn(StubbornRobot& robot, const ExecutorOptions& options
 }
 
 Pose StubbornStart() {
-  return StartPose(HousingTask(), planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3}), Pose::Identity());
+  return LatticeStartPose(HousingTask(), planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3}),
+                          Pose::Identity());
 }
 
 TEST(Executor, AdversarialRobotsEndWithAReason) {
@@ -283,7 +284,7 @@ TEST(Executor, AdversarialPoliciesEndWithAReason) {
   const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3});
   const auto run = [&](policies::Policy& policy) {
     KinematicRobot robot(HousingOverPanel(), HousingTask(), Pose::Identity(),
-                         StartPose(HousingTask(), problem, Pose::Identity()), {}, RandomStream(1, 1, "robot"));
+                         LatticeStartPose(HousingTask(), problem, Pose::Identity()), {}, RandomStream(1, 1, "robot"));
     return Execute(HousingTask(), problem, Pose::Identity(), policy, robot).reason;
   };
   EndlessPolicy endless;

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "core/error.h"
-#include "core/random.h"
-#include "perception/cloud_file.h"
-#include "perception/depth_file.h"
-#include "perception/uncertainty_table.h"
+#include "feeler/core/error.h"
+#include "feeler/core/random.h"
+#include "feeler/perception/cloud_file.h"
+#include "feeler/perception/depth_file.h"
+#include "feeler/perception/uncertainty_table.h"
 #include "tests/perception/sample_files.h"
 
 namespace feeler::perception {

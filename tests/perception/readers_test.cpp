@@ -5,10 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/error.h"
-#include "perception/cloud_file.h"
-#include "perception/depth_file.h"
-#include "perception/input_file.h"
+#include "feeler/core/error.h"
+#include "feeler/perception/cloud_file.h"
+#include "feeler/perception/depth_file.h"
+#include "feeler/perception/input_file.h"
 #include "tests/perception/sample_files.h"
 
 namespace feeler::perception {

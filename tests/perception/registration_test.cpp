@@ -3,7 +3,7 @@
 // not matter, bit for bit; points that are not finite do not either; other things beside the target and before it do
 // not draw it away; nothing, too little, and something else than the target are "not found", with a reason. Nothing is
 // found turned farther than is looked for. Thinning keeps both faces of a plate that is thinner than its cubes.
-#include "perception/registration.h"
+#include "feeler/perception/registration.h"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +13,8 @@
 #include <numbers>
 #include <utility>
 
-#include "core/error.h"
-#include "core/random.h"
+#include "feeler/core/error.h"
+#include "feeler/core/random.h"
 #include "tests/perception/synthetic_target.h"
 
 namespace feeler::perception {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "perception/depth_file.h"
-#include "perception/point_cloud.h"
+#include "feeler/perception/depth_file.h"
+#include "feeler/perception/point_cloud.h"
 
 namespace feeler::perception {
 

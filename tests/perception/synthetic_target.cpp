@@ -1,6 +1,6 @@
 #include "tests/perception/synthetic_target.h"
 
-#include "core/random.h"
+#include "feeler/core/random.h"
 
 namespace feeler::perception {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "core/pose.h"
-#include "perception/point_cloud.h"
-#include "perception/registration.h"
+#include "feeler/core/pose.h"
+#include "feeler/perception/point_cloud.h"
+#include "feeler/perception/registration.h"
 
 namespace feeler::perception {
 

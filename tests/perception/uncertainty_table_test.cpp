@@ -3,15 +3,15 @@
 // taking the bias out never needs more hypotheses here than leaving it in; estimates of one rule have one cuboid, and
 // the family is exactly the set of cuboids met; a table survives the way through its file bit for bit; one of another
 // version or task is refused.
-#include "perception/uncertainty_table.h"
+#include "feeler/perception/uncertainty_table.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "core/error.h"
-#include "core/random.h"
+#include "feeler/core/error.h"
+#include "feeler/core/random.h"
 
 namespace feeler::perception {
 namespace {

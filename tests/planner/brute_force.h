@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/lattice_problem.h"
 
 namespace feeler::planner::testing {
 

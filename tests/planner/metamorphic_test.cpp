@@ -6,10 +6,10 @@
 
 #include <limits>
 
-#include "core/error.h"
-#include "planner/preprocess/problem_family.h"
-#include "planner/solver/evaluate.h"
-#include "planner/solver/solve.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/policy/evaluate.h"
+#include "feeler/planner/solve.h"
 #include "tests/planner/random_problems.h"
 #include "tests/planner/synthetic_plug.h"
 

@@ -9,8 +9,8 @@
 
 #include <cmath>
 
-#include "planner/solver/evaluate.h"
-#include "planner/solver/solve.h"
+#include "feeler/planner/policy/evaluate.h"
+#include "feeler/planner/solve.h"
 #include "tests/planner/brute_force.h"
 #include "tests/planner/random_problems.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/lattice_problem.h"
 #include "tests/planner/random_problems.h"
 
 namespace feeler::planner::testing {

@@ -5,8 +5,8 @@
 #include <tuple>
 #include <vector>
 
-#include "core/random.h"
-#include "planner/belief/lattice_problem.h"
+#include "feeler/core/random.h"
+#include "feeler/planner/belief/lattice_problem.h"
 
 namespace feeler::planner::testing {
 

@@ -1,12 +1,12 @@
 // Laws of the solvers on plug-like problems: the policy replays validly against the contact map under every hypothesis,
 // at the cost the solver states; the lower bound is below it; the inflation bounds the ratio.
 
-#include "planner/solver/solve.h"
+#include "feeler/planner/solve.h"
 
 #include <gtest/gtest.h>
 
-#include "planner/preprocess/problem_family.h"
-#include "planner/solver/evaluate.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/policy/evaluate.h"
 #include "tests/planner/synthetic_plug.h"
 
 namespace feeler::planner {

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/orientation_lattice.h"
-#include "core/task.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/orientation_lattice.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner::testing {
 

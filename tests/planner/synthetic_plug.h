@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/task.h"
-#include "planner/contact/contact_map.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner::testing {
 

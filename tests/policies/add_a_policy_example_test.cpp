@@ -6,7 +6,7 @@
 #include <iterator>
 #include <string>
 
-#include "policies/kinematic_walk.h"
+#include "feeler/policies/touch/kinematic_walk.h"
 #include "tests/policies/block_problem.h"
 
 // clang-format off
@@ -15,7 +15,7 @@
 #include <tuple>
 #include <utility>
 
-#include "policies/policy.h"
+#include "feeler/policies/policy.h"
 
 namespace feeler::policies {
 

@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/task.h"
-#include "planner/contact/contact_map.h"
-#include "planner/preprocess/problem_family.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/contact/contact_map.h"
+#include "feeler/planner/family/problem_family.h"
 
 namespace feeler::policies {
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "planner/belief/lattice_problem.h"
-#include "planner/belief/problem.h"
-#include "planner/solver/policy.h"
+#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/problem.h"
+#include "feeler/planner/policy/policy_graph.h"
 
 namespace feeler::policies {
 
@@ -23,8 +23,8 @@ class BruteForce {
   double Value() { return Solve(All())[CellIndex(problem_.start)].cost; }
 
   /// An optimal policy, all shifts zero; the value must be finite.
-  planner::Policy MakePolicy() {
-    planner::Policy policy;
+  planner::PolicyGraph MakePolicy() {
+    planner::PolicyGraph policy;
     std::map<std::pair<std::uint32_t, std::size_t>, std::uint32_t> made;
     policy.root = MakeNode(policy, made, All(), problem_.start);
     policy.expected_cost = policy.nodes[policy.root].expected_cost;
@@ -133,7 +133,7 @@ class BruteForce {
     return solved_[subset] = std::move(best);
   }
 
-  std::uint32_t MakeNode(planner::Policy& policy, std::map<std::pair<Subset, std::size_t>, std::uint32_t>& made,
+  std::uint32_t MakeNode(planner::PolicyGraph& policy, std::map<std::pair<Subset, std::size_t>, std::uint32_t>& made,
                          Subset subset, const Cell& r) {
     const std::pair key{subset, CellIndex(r)};
     if (const auto found = made.find(key); found != made.end()) return found->second;

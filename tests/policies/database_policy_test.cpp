@@ -3,26 +3,26 @@
 //   coordinates of the problem, though nodes are shared between translates;
 // - an outcome without a branch is refused and changes nothing; Begin erases the past;
 // - a graph whose indices lead nowhere is refused; a cyclic one ends in giving up, not in a loop.
-#include "policies/database_policy.h"
+#include "feeler/policies/database_policy.h"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <variant>
 
-#include "core/error.h"
-#include "planner/preprocess/problem_family.h"
-#include "planner/solver/solve.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/solve.h"
 #include "tests/policies/block_problem.h"
 
 namespace feeler::policies {
 namespace {
 
-std::shared_ptr<const planner::Policy> Solved(const planner::Problem& problem) {
+std::shared_ptr<const planner::PolicyGraph> Solved(const planner::Problem& problem) {
   const planner::SolverResult result =
       planner::Solve(problem, planner::FastSetting(planner::SolverKind::kCertified, 1.5));
   if (!result.policy) return nullptr;
-  return std::make_shared<const planner::Policy>(*result.policy);
+  return std::make_shared<const planner::PolicyGraph>(*result.policy);
 }
 
 TEST(DatabasePolicy, EndsAtTheLeafOfTheTrueHypothesis) {
@@ -73,20 +73,20 @@ TEST(DatabasePolicy, UnknownOutcomeIsRefusedAndChangesNothing) {
 
 TEST(DatabasePolicy, BadGraphsAreRefused) {
   EXPECT_THROW(DatabasePolicy(nullptr), InputError);
-  planner::Policy empty;
-  EXPECT_THROW(DatabasePolicy(std::make_shared<const planner::Policy>(empty)), InputError);
-  planner::Policy dangling;
+  planner::PolicyGraph empty;
+  EXPECT_THROW(DatabasePolicy(std::make_shared<const planner::PolicyGraph>(empty)), InputError);
+  planner::PolicyGraph dangling;
   dangling.nodes.resize(1);
   dangling.nodes[0].branches.push_back({{1, true}, 7, Cell::Zero(), 1.0});
-  EXPECT_THROW(DatabasePolicy(std::make_shared<const planner::Policy>(dangling)), InputError);
+  EXPECT_THROW(DatabasePolicy(std::make_shared<const planner::PolicyGraph>(dangling)), InputError);
 }
 
 TEST(DatabasePolicy, ACycleEndsInGivingUp) {
-  planner::Policy cycle;
+  planner::PolicyGraph cycle;
   cycle.nodes.resize(1);
   cycle.nodes[0].move = {Direction::kPlusX, 1};
   cycle.nodes[0].branches.push_back({{1, false}, 0, Cell::Zero(), 1.0});
-  DatabasePolicy policy(std::make_shared<const planner::Policy>(cycle));
+  DatabasePolicy policy(std::make_shared<const planner::PolicyGraph>(cycle));
   policy.Begin(planner::Problem{});
   ASSERT_TRUE(policy.Observe({1, false}));
   EXPECT_TRUE(std::holds_alternative<GiveUp>(policy.Next({})));

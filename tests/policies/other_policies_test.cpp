@@ -7,20 +7,20 @@
 
 #include <memory>
 
-#include "core/error.h"
-#include "planner/solver/solve.h"
-#include "policies/hybrid_policy.h"
-#include "policies/kinematic_walk.h"
-#include "policies/online_policy.h"
-#include "policies/open_loop.h"
-#include "policies/spiral_policy.h"
+#include "feeler/core/error.h"
+#include "feeler/planner/solve.h"
+#include "feeler/policies/online_policy.h"
+#include "feeler/policies/open_loop.h"
+#include "feeler/policies/spiral/hybrid_policy.h"
+#include "feeler/policies/spiral/spiral_policy.h"
+#include "feeler/policies/touch/kinematic_walk.h"
 #include "tests/policies/block_problem.h"
 
 namespace feeler::policies {
 namespace {
 
 double MeanCost(const planner::Problem& problem, const OnlineOptions& options) {
-  const auto tables = std::make_shared<PlanningTablesCache>();
+  const auto tables = std::make_shared<planner::PlanningTablesCache>();
   OnlinePolicy policy(options, tables);
   double sum = 0.0;
   for (const planner::Hypothesis& truth : problem.hypotheses) {
@@ -46,7 +46,7 @@ TEST(OnlinePolicyTest, LocalizesEveryTruthWithinItsGap) {
 }
 
 TEST(OnlinePolicyTest, RefusesBudgetsThatAreNone) {
-  const auto tables = std::make_shared<PlanningTablesCache>();
+  const auto tables = std::make_shared<planner::PlanningTablesCache>();
   OnlineOptions no_time, no_expansions, no_gap;
   no_time.time_limit_s = 0.0;
   no_expansions.expansion_limit = 0;

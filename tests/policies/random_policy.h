@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "core/random.h"
-#include "planner/solver/policy.h"
+#include "feeler/core/random.h"
+#include "feeler/planner/policy/policy_graph.h"
 
 namespace feeler::policies {
 
 /// A lawful policy of about `nodes` nodes with random moves, shared nodes, shifts and costs, in random node order. With
 /// `uniform` the probabilities are those of a uniform prior, else arbitrary.
-inline planner::Policy RandomPolicy(RandomStream& random, std::size_t nodes, bool uniform) {
+inline planner::PolicyGraph RandomPolicy(RandomStream& random, std::size_t nodes, bool uniform) {
   const auto cell = [&](int range) {
     const auto draw = [&] { return static_cast<int>(random.Index(static_cast<std::uint64_t>(2 * range + 1))) - range; };
     const int x = draw(), y = draw(), z = draw();
@@ -62,7 +62,7 @@ inline planner::Policy RandomPolicy(RandomStream& random, std::size_t nodes, boo
   std::vector<std::uint32_t> place(nodes);
   for (std::uint32_t i = 0; i < nodes; ++i) place[i] = i;
   for (std::size_t k = nodes; k > 1; --k) std::swap(place[k - 1], place[random.Index(k)]);
-  planner::Policy policy;
+  planner::PolicyGraph policy;
   policy.nodes.resize(nodes);
   for (std::size_t i = 0; i < nodes; ++i) {
     for (planner::PolicyBranch& branch : built[i].branches) branch.next = place[branch.next];
@@ -77,7 +77,7 @@ inline planner::Policy RandomPolicy(RandomStream& random, std::size_t nodes, boo
 inline bool SameBits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
 /// Equal in every field, doubles bit for bit.
-inline bool Identical(const planner::Policy& a, const planner::Policy& b) {
+inline bool Identical(const planner::PolicyGraph& a, const planner::PolicyGraph& b) {
   if (a.root != b.root || a.nodes.size() != b.nodes.size()) return false;
   if (!SameBits(a.expected_cost, b.expected_cost) || !SameBits(a.lower_bound, b.lower_bound)) return false;
   for (std::size_t i = 0; i < a.nodes.size(); ++i) {

@@ -1,0 +1,62 @@
+#include "feeler/env/model/geom_shapes.h"
+
+#include <Eigen/Geometry>
+#include <cassert>
+
+namespace feeler::env {
+namespace {
+
+Pose LocalPose(const mjtNum* position, const mjtNum* quaternion) {
+  return MakePose(Eigen::Map<const Eigen::Vector3d>(position),
+                  Eigen::Quaterniond(quaternion[0], quaternion[1], quaternion[2], quaternion[3]));
+}
+
+}  // namespace
+
+Pose GeomInBody(const mjModel& model, int geom, int body) {
+  Pose pose = LocalPose(model.geom_pos + 3 * geom, model.geom_quat + 4 * geom);
+  for (int b = model.geom_bodyid[geom]; b != body; b = model.body_parentid[b]) {
+    assert(b > 0);
+    pose = LocalPose(model.body_pos + 3 * b, model.body_quat + 4 * b) * pose;
+  }
+  return pose;
+}
+
+std::vector<Eigen::Vector3d> MeshHull(const mjModel& model, int geom) {
+  const int mesh = model.geom_dataid[geom];
+  const float* vertices = model.mesh_vert + 3 * model.mesh_vertadr[mesh];
+  const auto vertex = [&](int i) {
+    return Eigen::Vector3d(double{vertices[3 * i]}, double{vertices[3 * i + 1]}, double{vertices[3 * i + 2]});
+  };
+  std::vector<Eigen::Vector3d> hull;
+  const int address = model.mesh_graphadr[mesh];
+  if (address < 0) {
+    for (int i = 0; i < model.mesh_vertnum[mesh]; ++i) hull.push_back(vertex(i));
+    return hull;
+  }
+  // Layout of the graph: numvert, numface, vert_edgeadr[numvert], vert_globalid[numvert], ...
+  const int* graph = model.mesh_graph + address;
+  const int count = graph[0];
+  for (int i = 0; i < count; ++i) hull.push_back(vertex(graph[2 + count + i]));
+  return hull;
+}
+
+planner::ConvexPiece PieceOf(const mjModel& model, int geom, const Pose& frame_T_geom) {
+  planner::ConvexPiece piece;
+  piece.size_m = Eigen::Map<const Eigen::Vector3d>(model.geom_size + 3 * geom);
+  piece.frame_T_piece = frame_T_geom;
+  switch (model.geom_type[geom]) {
+    case mjGEOM_SPHERE: piece.kind = planner::ShapeKind::kSphere; break;
+    case mjGEOM_CAPSULE: piece.kind = planner::ShapeKind::kCapsule; break;
+    case mjGEOM_CYLINDER: piece.kind = planner::ShapeKind::kCylinder; break;
+    case mjGEOM_ELLIPSOID: piece.kind = planner::ShapeKind::kEllipsoid; break;
+    case mjGEOM_MESH:
+      piece.kind = planner::ShapeKind::kPolytope;
+      piece.vertices_m = MeshHull(model, geom);
+      break;
+    default: piece.kind = planner::ShapeKind::kBox;
+  }
+  return piece;
+}
+
+}  // namespace feeler::env

@@ -1,0 +1,208 @@
+#include "feeler/env/model/task_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <numbers>
+#include <string_view>
+
+#include "feeler/core/error.h"
+#include "feeler/core/orientation_lattice.h"
+#include "feeler/env/model/mujoco_handles.h"
+#include "feeler/env/model/overlap_judge.h"
+#include "feeler/env/model/task_fields.h"
+#include "feeler/env/model/task_xml.h"
+
+namespace feeler::env {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool BelongsTo(const mjModel& model, int geom, int body) {
+  for (int b = model.geom_bodyid[geom]; b > 0; b = model.body_parentid[b]) {
+    if (b == body) return true;
+  }
+  return false;
+}
+
+int FindBody(const mjModel& model, const char* name, const std::string& where) {
+  const int body = mj_name2id(&model, mjOBJ_BODY, name);
+  if (body < 0) {
+    throw InputError(fmt::format("{}: <worldbody>", where), fmt::format("<body name=\"{}\"> is missing", name),
+                     "a task has one body `tool` and one body `target`");
+  }
+  if (model.body_parentid[body] != 0) {
+    throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "is not a child of <worldbody>");
+  }
+  return body;
+}
+
+void SortGeoms(TaskModel& task_model, const std::string& where) {
+  const mjModel& model = *task_model.model;
+  for (int geom = 0; geom < model.ngeom; ++geom) {
+    const std::string_view name = model.names + model.name_geomadr[geom];
+    const bool can_collide = model.geom_contype[geom] != 0 || model.geom_conaffinity[geom] != 0;
+    const bool of_tool = BelongsTo(model, geom, task_model.tool_body);
+    const bool of_target = BelongsTo(model, geom, task_model.target_body);
+    const bool lid = (of_target || of_tool) && name.starts_with("lid");
+    if (lid && can_collide) {
+      throw InputError(fmt::format("{}: <geom name=\"{}\">", where, name), "a lid collides in physics",
+                       "set contype=\"0\" conaffinity=\"0\"");
+    }
+    if (lid) (of_tool ? task_model.tool_lid_geoms : task_model.lid_geoms).push_back(geom);
+    if (!can_collide || (!of_tool && !of_target)) continue;
+    const int type = model.geom_type[geom];
+    if (type == mjGEOM_HFIELD || (type == mjGEOM_PLANE && of_tool)) {
+      throw InputError(fmt::format("{}: <geom name=\"{}\">", where, name),
+                       type == mjGEOM_HFIELD ? "height fields are not supported" : "a tool cannot have a plane",
+                       "use boxes, cylinders, capsules, spheres, ellipsoids or convex meshes");
+    }
+    (of_tool ? task_model.tool_geoms : task_model.target_geoms).push_back(geom);
+  }
+  for (const auto& [geoms, name] : {std::pair{&task_model.tool_geoms, "tool"}, {&task_model.target_geoms, "target"}}) {
+    if (geoms->empty()) {
+      throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "has no geom that can collide");
+    }
+  }
+}
+
+Pose BodyAtRest(const mjModel& model, int body) {
+  const DataHandle data = MakeData(model);
+  mj_kinematics(&model, data.get());
+  return BodyPose(*data, body);
+}
+
+/// Contradictions between the numbers and the geometry.
+void CheckGeometry(const TaskModel& task_model, const std::string& where) {
+  const Task& task = task_model.task;
+  const auto numeric = [&](const char* field) {
+    return fmt::format("{}: <custom><numeric name=\"{}\">", where, field);
+  };
+
+  OverlapJudge open(task_model, task_model.target_geoms);
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  // A little short of the end, so that a tool that rests on the floor of the opening is not taken for a collision.
+  constexpr int kSteps = 50;
+  for (int i = 0; i < kSteps; ++i) {
+    const double depth_m = task.insertion_depth_m * i / kSteps;
+    if (open.Overlap(inward * depth_m)) {
+      throw InputError(
+          numeric("feeler_insertion_depth"),
+          fmt::format("the tool, aligned, meets the target {:.4f} m beyond the mouth, before it is inserted", depth_m),
+          "check the origins of the bodies tool and target, the opening, or the depth");
+    }
+  }
+
+  const double just_inside_m = std::min(5e-5, task.insertion_depth_m / 10);
+  const int axis = AxisOf(task.insertion);
+  for (int k = 0; k < 9; ++k) {
+    Eigen::Vector3d lateral_m = Eigen::Vector3d::Zero();
+    lateral_m[(axis + 1) % 3] = task.tolerance.lateral_m * (k % 3 - 1);
+    lateral_m[(axis + 2) % 3] = task.tolerance.lateral_m * (k / 3 - 1);
+    if (open.Overlap(lateral_m + inward * just_inside_m)) {
+      throw InputError(
+          numeric("feeler_tolerance_lateral"),
+          fmt::format("a tool displaced by {} m along each axis misses the opening", task.tolerance.lateral_m),
+          "the tolerance is at most the clearance and the lead-in chamfer");
+    }
+  }
+
+  const Cell cuboid = LargestPositionExtents(task);
+  const Eigen::Vector3d half_m = (cuboid - Cell::Ones()).cast<double>() * (task.cell_m / 2);
+  for (const Eigen::Quaterniond& orientation : TargetOrientations(task)) {
+    OverlapJudge closed(task_model, GeomsOf(task_model, Opening::kClosed), orientation);
+    for (int corner = 0; corner < 27; ++corner) {
+      const Eigen::Vector3d sign(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
+      if (closed.Overlap(task.start_offset_m - sign.cwiseProduct(half_m))) {
+        throw InputError(numeric("feeler_start_offset"),
+                         "the tool starts in collision with the target under a hypothesis of the largest extents",
+                         "start further away or lower feeler_max_cells");
+      }
+    }
+  }
+}
+
+/// Whether the tool, aligned and anywhere on its way in, is free of contact at every turn about the insertion axis.
+bool TurnsFreely(const TaskModel& task_model) {
+  const Task& task = task_model.task;
+  constexpr int kTurns = 36;  // 10 degrees each: no multiple of the sides of a polygon that is meant to be round
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  for (int turn = 1; turn < kTurns; ++turn) {
+    // Turning the target one way is turning the tool the other way.
+    const Eigen::Quaterniond orientation(Eigen::AngleAxisd(2 * std::numbers::pi * turn / kTurns, inward));
+    OverlapJudge judge(task_model, GeomsOf(task_model, Opening::kOpen), orientation);
+    for (const double share : {0.1, 0.5, 0.98}) {
+      if (judge.Overlap(inward * (share * task.insertion_depth_m))) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string_view ToString(Opening opening) { return opening == Opening::kClosed ? "closed" : "open"; }
+
+FeltGeoms GeomsOf(const TaskModel& task_model, Opening opening) {
+  FeltGeoms geoms{task_model.tool_geoms, task_model.target_geoms};
+  if (opening == Opening::kOpen) return geoms;
+  geoms.tool.insert(geoms.tool.end(), task_model.tool_lid_geoms.begin(), task_model.tool_lid_geoms.end());
+  geoms.target.insert(geoms.target.end(), task_model.lid_geoms.begin(), task_model.lid_geoms.end());
+  return geoms;
+}
+
+std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
+  std::vector<Eigen::Quaterniond> orientations;
+  for (int k = 0; k < LatticeOrientations(task); ++k) orientations.push_back(LatticeOrientation(task, k));
+  return orientations;
+}
+
+fs::path ModelsFolder() {
+  const char* folder = std::getenv("FEELER_MODELS");
+  return folder != nullptr && *folder != '\0' ? fs::path(folder) : fs::path(FEELER_MODELS_DIR);
+}
+
+TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+  TaskModel task_model;
+  task_model.xml = ResolveMjcf(mjcf, name, folder);
+  task_model.model = std::shared_ptr<const mjModel>(CompileMjcf(task_model.xml, name));
+  const mjModel& model = *task_model.model;
+  task_model.tool_body = FindBody(model, "tool", name);
+  task_model.target_body = FindBody(model, "target", name);
+  SortGeoms(task_model, name);
+  task_model.task = ReadTaskFields(model, name);
+  task_model.task.world_T_target = BodyAtRest(model, task_model.target_body);
+  task_model.task.name = fs::path(name).stem().string();
+  CheckGeometry(task_model, name);
+  task_model.task.turns_freely = TurnsFreely(task_model);
+  return task_model;
+}
+
+TaskModel LoadTask(const std::string& task) {
+  const bool is_path = task.find('/') != std::string::npos || task.ends_with(".xml");
+  const fs::path file = is_path ? fs::path(task) : ModelsFolder() / "tasks" / (task + ".xml");
+  if (!fs::is_regular_file(file)) {
+    std::string known;
+    for (const std::string& name : ListTasks()) known += " " + name;
+    throw InputError(is_path ? task : "task " + task, "no such task",
+                     is_path
+                         ? "give a task's name or the path of a task file"
+                         : "tasks are:" + (known.empty() ? " none in " + (ModelsFolder() / "tasks").string() : known));
+  }
+  TaskModel task_model = LoadTaskFromText(ReadTextFile(file), file.lexically_normal().string(), file.parent_path());
+  task_model.file = fs::absolute(file).lexically_normal();
+  task_model.task.file = task_model.file.string();
+  return task_model;
+}
+
+std::vector<std::string> ListTasks() {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(ModelsFolder() / "tasks", error)) {
+    if (entry.path().extension() == ".xml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace feeler::env

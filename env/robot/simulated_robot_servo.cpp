@@ -1,0 +1,116 @@
+// What SimulatedRobot does at the rate of a controller or a camera: the picture, one step of an integrated twist, the
+// low-level step of learners, the zero of the wrench.
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "feeler/core/error.h"
+#include "feeler/env/robot/simulated_robot.h"
+
+namespace feeler::env {
+
+CameraView SimulatedRobot::Look() {
+  if (!wrist_camera_) wrist_camera_ = std::make_unique<WristCamera>(scene_, options_.wrist_camera);
+  return wrist_camera_->Look(world_.data(), &image_random_);
+}
+
+std::optional<JointReference> SimulatedRobot::Advance(const Vector6& wanted, TwistReference& reference,
+                                                      JointVector& q) const {
+  const double dt = world_.timestep_s();
+  // The velocity changes as fast as the robot's acceleration allows, linear and angular each along a straight line.
+  const auto approach = [&](Eigen::Index part, double acceleration) {
+    const Eigen::Vector3d change = wanted.segment<3>(part) - reference.twist.segment<3>(part);
+    const double most = acceleration * dt;
+    reference.twist.segment<3>(part) +=
+        change.norm() > most ? Eigen::Vector3d(change * (most / change.norm())) : change;
+  };
+  approach(0, options_.acceleration_m_s2);
+  approach(3, options_.angular_acceleration_rad_s2);
+  const Eigen::PartialPivLU<Matrix6> jacobian(ToolJacobian(*scene_, q));
+  JointVector speed = jacobian.solve(reference.twist);
+  if (!speed.allFinite()) return std::nullopt;
+  const double excess = speed.cwiseAbs().cwiseQuotient(scene_->velocity_limit_rad_s).maxCoeff();
+  if (excess > 1.0) {
+    reference.twist /= excess;
+    speed /= excess;
+  }
+  Pose next = reference.world_T_tool;
+  next.translation() += dt * reference.twist.head<3>();
+  const double turn = dt * reference.twist.tail<3>().norm();
+  if (turn > 0.0) next.linear() = Eigen::AngleAxisd(turn, reference.twist.tail<3>().normalized()) * next.linear();
+  JointVector there = q;
+  if (!SolveNearby(*scene_, next, there)) return std::nullopt;
+  const mjModel& model = *scene_->model;
+  for (int i = 0; i < kJointCount; ++i) {
+    const int joint = scene_->joint[static_cast<std::size_t>(i)];
+    const mjtNum* range = model.jnt_range + 2 * joint;
+    if (model.jnt_limited[joint] != 0 && (there[i] < range[0] || there[i] > range[1])) return std::nullopt;
+  }
+  reference.world_T_tool = next;
+  q = there;
+  JointReference result;
+  result.q_rad = q;
+  result.qd_rad_s = speed;
+  return result;
+}
+
+MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const ImpedanceGains& gains) {
+  if (!delta.allFinite()) throw InputError("servo", "the step of the set point is not finite");
+  if (steps < 1) throw InputError("servo", fmt::format("{} steps", steps), "give one or more");
+  return Guard([&] {
+    constexpr double kLeash_m = 0.02;
+    constexpr double kLeash_rad = 0.1;
+    const Pose start = ToolPose();
+    Pose set_point = set_point_.value_or(start);
+    set_point.translation() += delta.head<3>();
+    const double turn = delta.tail<3>().norm();
+    if (turn > 0) set_point.linear() = Eigen::AngleAxisd(turn, delta.tail<3>() / turn) * set_point.linear();
+    Vector6 stretch = PoseError(start, set_point);
+    if (const double d = stretch.head<3>().norm(); d > kLeash_m) stretch.head<3>() *= kLeash_m / d;
+    if (const double a = stretch.tail<3>().norm(); a > kLeash_rad) stretch.tail<3>() *= kLeash_rad / a;
+    set_point.translation() = start.translation() + stretch.head<3>();
+    const double angle = stretch.tail<3>().norm();
+    set_point.linear() = start.linear();
+    if (angle > 0) set_point.linear() = Eigen::AngleAxisd(angle, stretch.tail<3>() / angle) * start.linear();
+
+    set_point_ = set_point;
+    held_orientation_ = set_point.linear();
+    PosePoint reference;
+    reference.pose = set_point;
+    MotionResult result;
+    for (int i = 0; i < steps; ++i) {
+      if (world_.time_s() >= deadline_s_) {
+        result.reason = StopReason::kTimeLimit;
+        break;
+      }
+      StepOnce(CartesianImpedance(world_, frame_, world_.qd_rad_s(), reference, gains));
+    }
+    result.contact = sensor_.ToolFlag();
+    result.world_T_tool = ToolPose();
+    result.travelled_m = (result.world_T_tool.translation() - start.translation()).norm();
+    return result;
+  });
+}
+
+void SimulatedRobot::ZeroWrench() {
+  if (Refused()) return;
+  const auto steps = static_cast<int>(std::lround(options_.zeroing_time_s / world_.timestep_s()));
+  Wrench mean;
+  JointReference here;
+  here.q_rad = q_rad();
+  try {
+    for (int i = 0; i < steps; ++i) {
+      TrackStep(here);
+      mean.force_n += sensor_.raw().force_n / steps;
+      mean.torque_nm += sensor_.raw().torque_nm / steps;
+    }
+  } catch (const WorldError&) {
+    return;  // the next motion reports it
+  }
+  sensor_.Shift(mean);
+}
+
+}  // namespace feeler::env

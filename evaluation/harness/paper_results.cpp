@@ -1,0 +1,44 @@
+#include "feeler/evaluation/harness/paper_results.h"
+
+#include <fstream>
+
+#include "feeler/core/error.h"
+
+namespace feeler::evaluation {
+namespace {
+
+/// The last three columns of a row.
+PrintedRow Values(const nlohmann::json& row) {
+  const std::size_t size = row.size();
+  return {row[size - 3].get<double>(), row[size - 2].get<double>(), row[size - 1].get<double>()};
+}
+
+}  // namespace
+
+const nlohmann::json& PaperResults() {
+  static const nlohmann::json kResults = [] {
+    std::ifstream in(FEELER_PAPER_RESULTS);
+    nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
+    if (!json.is_object()) {
+      throw InputError(FEELER_PAPER_RESULTS, "missing or damaged", "restore it from the source of feeler");
+    }
+    return json;
+  }();
+  return kResults;
+}
+
+std::optional<PrintedRow> PrintedSolver(const std::string& table, const std::string& solver, double epsilon) {
+  for (const nlohmann::json& row : PaperResults().at(table).at("rows")) {
+    if (row[0] == solver && row[1].get<double>() == epsilon) return Values(row);
+  }
+  return std::nullopt;
+}
+
+std::optional<PrintedRow> PrintedVariant(const std::string& table, const std::string& variant) {
+  for (const nlohmann::json& row : PaperResults().at(table).at("rows")) {
+    if (row[0] == variant) return Values(row);
+  }
+  return std::nullopt;
+}
+
+}  // namespace feeler::evaluation

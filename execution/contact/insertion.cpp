@@ -1,0 +1,84 @@
+#include "feeler/execution/contact/insertion.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "feeler/execution/contact/confirm.h"
+#include "feeler/execution/contact/free_path.h"
+
+namespace feeler::execution {
+namespace {
+
+/// The insertion begins this far in front of the mouth, in cells.
+constexpr double kStandoff = 1.5;
+/// A clear displacement in front of the mouth is looked for up to here.
+constexpr int kFarthestClear = 8;
+
+Cell Nearest(const Eigen::Vector3d& cells) {
+  return {static_cast<int>(std::lround(cells.x())), static_cast<int>(std::lround(cells.y())),
+          static_cast<int>(std::lround(cells.z()))};
+}
+
+}  // namespace
+
+BelievedInsertion ApproachAndInsert(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
+                                    int orientation, Mover& mover, std::vector<Touch>& evidence) {
+  const Eigen::Vector3d out = -UnitVector(task.insertion);
+  std::optional<Cell> gate;
+  for (int cells = 1; cells <= kFarthestClear && !gate; ++cells) {
+    const Cell candidate = Nearest(cells * out - map.phase());
+    if (IsClear(map, candidate, orientation)) gate = candidate;
+  }
+  if (!gate) throw LostTrack("insertion: no free place in front of the opening");
+  const Cell here = NearestFree(map, mover.position() - target, orientation);
+  auto path = FindFreePath(map, here, EndAt(*gate), orientation);
+  if (!path) throw LostTrack("insertion: no free way to the opening");
+  if (path->size() > 1) path->pop_back();  // the last leg ends exactly in front of the opening, not at a lattice point
+  if (!FollowPath(map, target, *path, "approach", mover, evidence)) {
+    return {false, false, "insertion: unexpected contact on the way to the opening"};
+  }
+  // In front of the opening, exactly; then near it.
+  const Eigen::Vector3d gate_displacement = gate->cast<double>() + map.phase();
+  const double gate_distance = std::max(kStandoff, gate_displacement.dot(out));
+  for (const double distance : {gate_distance, kStandoff}) {
+    const Eigen::Vector3d place = target + distance * out;
+    if ((mover.position() - place).norm() < 0.05) continue;
+    const Eigen::Vector3d from = mover.position();
+    const MotionReport report = mover.Fast(place, "approach");
+    if (report.contact) {
+      evidence.push_back(ContactAfter(from, report.end));
+      const Eigen::Vector3d back = from - report.end;
+      mover.Retreat(back.norm() > 1.0 ? Eigen::Vector3d(report.end + back.normalized()) : from);
+      return {false, false, "insertion: unexpected contact in front of the opening"};
+    }
+  }
+  mover.ZeroWrench();
+  return InsertFromHere(task, target, mover);
+}
+
+BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, Mover& mover) {
+  const Eigen::Vector3d out = -UnitVector(task.insertion);
+  const double depth = mover.Cells(task.insertion_depth_m);
+  const double overdrive = mover.Cells(mover.options().insertion_overdrive_m);
+  const MotionReport report = mover.Insert(target - (depth + overdrive) * out);
+  const Eigen::Vector3d displacement = report.end - target;
+  const double reached = -displacement.dot(out);
+  Eigen::Vector3d lateral = displacement + reached * out;
+  lateral[AxisOf(task.insertion)] = 0.0;
+  const double cell_m = mover.frame().cell_m;
+  if ((depth - reached) * cell_m > task.tolerance.vertical_m) {
+    return {false, true,
+            fmt::format("insertion: stopped after {:.2f} of {:.2f} mm ({})", 1e3 * reached * cell_m,
+                        1e3 * task.insertion_depth_m, ToString(report.reason))};
+  }
+  // An axis that is wrong by more than the tolerance and still at depth is beside the opening, not in it.
+  if (lateral.cwiseAbs().maxCoeff() * cell_m > 2.0 * task.tolerance.lateral_m) {
+    return {false, true,
+            fmt::format("insertion: at depth, but {:.2f} mm beside the opening",
+                        1e3 * lateral.cwiseAbs().maxCoeff() * cell_m)};
+  }
+  return {true, false, "inserted"};
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,181 @@
+#include "feeler/execution/contact/mover.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace feeler::execution {
+namespace {
+
+/// Contact force that no motion reaches: a retreat starts in contact and must not stop for it.
+constexpr double kUnwatched = 1e6;
+
+}  // namespace
+
+std::optional<Direction> DirectionOf(const Eigen::Vector3d& motion) {
+  int axis = 0;
+  const double along = motion.cwiseAbs().maxCoeff(&axis);
+  if (along <= 0.0) return std::nullopt;
+  Eigen::Vector3d across = motion;
+  across[axis] = 0.0;
+  if (across.norm() > 0.1 * along) return std::nullopt;
+  return MakeDirection(axis, motion[axis] < 0.0 ? -1 : 1);
+}
+
+Mover::Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
+             double started_s)
+    : robot_(robot),
+      frame_(frame),
+      options_(options),
+      record_(record),
+      start_time_s_(started_s),
+      last_motion_end_s_(robot.Time()) {
+  position_ = Measure(robot.ToolPose());
+}
+
+Eigen::Vector3d Mover::Measure(const Pose& world_T_tool) const {
+  const Eigen::Vector3d u = frame_.FromWorld(world_T_tool);
+  // Far beyond any workspace is as meaningless as NaN, and lattice arithmetic on it would overflow.
+  if (!u.allFinite() || u.cwiseAbs().maxCoeff() > 1e6) {
+    throw ExecutionFailure("robot: the measured tool pose is not a sensible number");
+  }
+  return u;
+}
+
+void Mover::CheckLimits() const {
+  if (static_cast<int>(record_.moves.size()) >= options_.motion_limit) {
+    throw ExecutionFailure(fmt::format("limit: {} motions without a verdict", options_.motion_limit));
+  }
+  const double elapsed = robot_.Time() - start_time_s_;
+  if (!(elapsed <= options_.time_limit_s)) {
+    throw ExecutionFailure(fmt::format("limit: {:.1f} s without a verdict", elapsed));
+  }
+}
+
+MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,
+                           const PredictedCells& predicted, bool shortfall) {
+  const Eigen::Vector3d before = position_;
+  const Eigen::Vector3d motion = target - before;
+  const double length = motion.norm();
+  MotionReport report;
+  report.end = Measure(result.world_T_tool);
+  report.reason = result.reason;
+  const double travelled = length > 0.0 ? (report.end - before).dot(motion) / length : 0.0;
+  report.contact = result.contact || result.reason == StopReason::kContact ||
+                   (shortfall && (length - travelled) * frame_.cell_m > options_.shortfall_m);
+
+  MoveRecord move;
+  move.kind = kind;
+  if (const auto direction = DirectionOf(motion)) move.direction = ToString(*direction);
+  move.commanded_m = length * frame_.cell_m;
+  if (predicted) {
+    move.predicted_m = {std::clamp((*predicted)[0], 0.0, length) * frame_.cell_m,
+                        std::clamp((*predicted)[1], 0.0, length) * frame_.cell_m};
+  }
+  move.travelled_m = travelled * frame_.cell_m;
+  move.contact = report.contact;
+  move.peak_force_n = std::isfinite(result.peak_force_n) ? result.peak_force_n : 0.0;
+  const double now_s = robot_.Time();
+  move.duration_s = now_s - last_motion_end_s_;
+  last_motion_end_s_ = now_s;
+  record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
+  record_.path_length_m += (report.end - before).norm() * frame_.cell_m;
+  record_.moves.push_back(std::move(move));
+
+  position_ = report.contact ? report.end : target;
+  if (result.reason == StopReason::kAborted || result.reason == StopReason::kUnplanned) {
+    throw ExecutionFailure(fmt::format("robot: {} motion {}{}{}", kind, ToString(result.reason),
+                                       result.detail.empty() ? "" : ": ", result.detail));
+  }
+  return report;
+}
+
+MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted) {
+  CheckLimits();
+  const MotionResult result =
+      robot_.LinearMove(frame_.ToWorld(target), options_.transfer_speed_m_s, options_.contact_force_n);
+  const MotionReport report = Finish(result, target, kind, predicted, true);
+  if (report.contact) ++record_.contacts;
+  return report;
+}
+
+MotionReport Mover::Probe(Direction direction, double coordinate, const std::string& kind,
+                          const PredictedCells& predicted) {
+  CheckLimits();
+  const Eigen::Vector3d from = Measure(robot_.ToolPose());
+  position_ = from;
+  Eigen::Vector3d target = from;
+  target[AxisOf(direction)] = coordinate;
+  const double cells = SignOf(direction) * (coordinate - from[AxisOf(direction)]);
+  GuardedMotion motion;
+  motion.direction = frame_.DirectionInWorld(direction);
+  motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
+  motion.speed_m_s = options_.probe_speed_m_s;
+  motion.contact_force_n = options_.contact_force_n;
+  const MotionReport report = Finish(robot_.Guarded(motion), target, kind, predicted, true);
+  if (report.contact) ++record_.contacts;
+  return report;
+}
+
+void Mover::Retreat(const Eigen::Vector3d& target) {
+  CheckLimits();
+  Finish(robot_.LinearMove(frame_.ToWorld(target), options_.transfer_speed_m_s, kUnwatched), target, "retreat", {},
+         false);
+  robot_.ZeroWrench();
+}
+
+MotionReport Mover::Insert(const Eigen::Vector3d& target) {
+  CheckLimits();
+  CompliantMotion motion;
+  motion.world_T_tool = {frame_.ToWorld(target)};
+  motion.speed_m_s = options_.insertion_speed_m_s;
+  motion.force_limit_n = options_.insertion_force_limit_n;
+  return Finish(robot_.Compliant(motion), target, "insert", {}, false);
+}
+
+MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind) {
+  CheckLimits();
+  CompliantMotion motion;
+  for (const Eigen::Vector3d& place : way_points) motion.world_T_tool.push_back(frame_.ToWorld(place));
+  motion.speed_m_s = speed_m_s;
+  motion.force_limit_n = options_.insertion_force_limit_n;
+  const MotionReport report = Finish(robot_.Compliant(motion), way_points.back(), kind, {}, false);
+  position_ = report.end;  // what it is pressed against, not the command, says where it is
+  return report;
+}
+
+MotionReport Mover::Follow(const TwistMotion& motion) {
+  CheckLimits();
+  TwistMotion watched = motion;
+  watched.contact_force_n = options_.contact_force_n;
+  const MotionResult result = robot_.FollowTwist(watched);
+  MotionReport report;
+  report.end = Measure(result.world_T_tool);
+  report.contact = result.contact || result.reason == StopReason::kContact;
+  report.reason = result.reason;
+  if (record_.moves.empty() || record_.moves.back().kind != "servo") {
+    record_.moves.emplace_back();
+    record_.moves.back().kind = "servo";
+  }
+  MoveRecord& move = record_.moves.back();
+  const double travelled_m = (report.end - position_).norm() * frame_.cell_m;
+  move.commanded_m += motion.linear_m_s.norm() * motion.duration_s;
+  move.travelled_m += travelled_m;
+  move.contact = report.contact;
+  if (std::isfinite(result.peak_force_n)) move.peak_force_n = std::max(move.peak_force_n, result.peak_force_n);
+  const double now_s = robot_.Time();
+  move.duration_s += now_s - last_motion_end_s_;
+  last_motion_end_s_ = now_s;
+  record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
+  record_.path_length_m += travelled_m;
+  position_ = report.end;
+  if (report.contact) ++record_.contacts;
+  if (result.reason == StopReason::kAborted || result.reason == StopReason::kUnplanned) {
+    throw ExecutionFailure(fmt::format("robot: servo motion {}{}{}", ToString(result.reason),
+                                       result.detail.empty() ? "" : ": ", result.detail));
+  }
+  return report;
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "feeler/core/robot.h"
+#include "feeler/execution/contact/execution_record.h"
+#include "feeler/execution/contact/executor_options.h"
+#include "feeler/execution/contact/lattice_frame.h"
+
+namespace feeler::execution {
+
+/// Ends an execution; `what()` becomes the reason in the record. Never leaves the room.
+class ExecutionFailure : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What was felt does not fit what the policy knows, or it knows no further: robot and episode are sound, and another
+/// plan may do better.
+class LostTrack : public ExecutionFailure {
+ public:
+  using ExecutionFailure::ExecutionFailure;
+};
+
+/// Where a motion ended, as measured, in lattice coordinates.
+struct MotionReport {
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  bool contact = false;  ///< by force, or because the motion fell short
+  StopReason reason = StopReason::kReached;
+};
+
+/// Predicted travel in cells, least and greatest.
+using PredictedCells = std::optional<std::array<double, 2>>;
+
+/// Moves the tool in lattice coordinates, with the orientation of the estimate, and writes every motion into the
+/// record. Throws ExecutionFailure when the robot fails, answers nonsense, or the limits of the episode are exceeded.
+class Mover {
+ public:
+  /// All arguments outlive the mover.
+  /// `started_s`: when the episode began, on the clock of the robot.
+  Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
+        double started_s);
+
+  /// Where the tool was last sent, or found at contact.
+  const Eigen::Vector3d& position() const { return position_; }
+  const LatticeFrame& frame() const { return frame_; }
+  const ExecutorOptions& options() const { return options_; }
+  double Cells(double metres) const { return metres / frame_.cell_m; }
+
+  /// Fast and straight to `target`, watched for contact.
+  MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {});
+  /// Slowly along an axis until its coordinate is `coordinate` or a contact comes.
+  MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted);
+  /// Off a wall: contacts are expected to end, not watched for. Then takes the wrench as zero.
+  void Retreat(const Eigen::Vector3d& target);
+  /// Compliantly from here straight to `target`.
+  MotionReport Insert(const Eigen::Vector3d& target);
+  /// Compliantly through way points, pressing on what is under the tool.
+  MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
+  /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".
+  MotionReport Follow(const TwistMotion& motion);
+  CameraView Look() { return robot_.Look(); }
+  /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
+  Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
+  void ZeroWrench() { robot_.ZeroWrench(); }
+
+ private:
+  Eigen::Vector3d Measure(const Pose& world_T_tool) const;
+  void CheckLimits() const;
+  /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
+  MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,
+                      const PredictedCells& predicted, bool shortfall);
+
+  Robot& robot_;
+  const LatticeFrame& frame_;
+  const ExecutorOptions& options_;
+  ExecutionRecord& record_;
+  double start_time_s_;
+  double last_motion_end_s_;
+  Eigen::Vector3d position_;
+};
+
+/// The axis direction nearest to `motion` if it is along an axis but for 10 % of its length.
+std::optional<Direction> DirectionOf(const Eigen::Vector3d& motion);
+
+}  // namespace feeler::execution

@@ -1,0 +1,72 @@
+#include "feeler/execution/contact/spiral_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace feeler::execution {
+namespace {
+
+/// The tool has dropped into the opening, not just over an unevenness.
+constexpr double kDrop_m = 0.0008;
+/// Stiffness along the insertion with which it is pressed, N/m: a compliant motion's own.
+constexpr double kStiffness_n_m = 4000.0;
+/// Way points per turn, and how many of them make one motion.
+constexpr int kPerTurn = 16;
+constexpr int kPerMotion = 8;
+/// A tool that stays this near to the middle while the spiral goes this far is held by the walls of the opening: it
+/// came right down into it. On the face it lags behind by what friction holds, some millimetres. (A narrower search
+/// looks for the face not as deep as the bottom.)
+constexpr double kHeld_m = 0.0015;
+constexpr double kWide_m = 0.008;
+
+/// The tool stands in the opening, deeper than its mouth: pushes it down.
+SpiralFind PushDown(const Task& task, Mover& mover) {
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  const double depth = mover.Cells(task.insertion_depth_m);
+  const MotionReport report = mover.Insert(mover.position() + depth * inward);
+  return {report.end - depth * inward, true};
+}
+
+}  // namespace
+
+std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& target,
+                                       const policies::SpiralSearch& search, Mover& mover) {
+  const int axis = AxisOf(task.insertion);
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  const Eigen::Vector3d u = Eigen::Vector3d::Unit((axis + 1) % 3);
+  const Eigen::Vector3d v = Eigen::Vector3d::Unit((axis + 2) % 3);
+  const double range = mover.Cells(search.face_range_m);
+  mover.Retreat(target - range * inward);
+  const MotionReport face = mover.Probe(task.insertion, (target + range * inward)[axis], "spiral", PredictedCells{});
+  if (!face.contact) return PushDown(task, mover);
+  const double height = face.end[axis];
+  const double pressed = height + SignOf(task.insertion) * mover.Cells(search.press_n / kStiffness_n_m);
+  const int points = static_cast<int>(search.radius_m / search.pitch_m * kPerTurn);
+  std::vector<Eigen::Vector3d> way;
+  double farthest = 0.0;
+  for (int i = 1; i <= points; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kPerTurn;
+    const double radius = mover.Cells(search.pitch_m) * i / kPerTurn;
+    Eigen::Vector3d place = target + radius * (std::cos(angle) * u + std::sin(angle) * v);
+    place[axis] = pressed;
+    way.push_back(place);
+    if (i % kPerMotion != 0 && i != points) continue;
+    const MotionReport report = mover.Press(way, search.speed_m_s, "spiral");
+    way.clear();
+    if (SignOf(task.insertion) * (report.end[axis] - height) > mover.Cells(kDrop_m)) {
+      Eigen::Vector3d found = report.end;
+      found[axis] = height;
+      return SpiralFind{found, false};
+    }
+    Eigen::Vector3d followed = report.end - target;
+    followed[axis] = 0.0;
+    farthest = std::max(farthest, followed.norm());
+  }
+  if (search.radius_m > kWide_m && farthest < mover.Cells(kHeld_m)) return PushDown(task, mover);
+  mover.Retreat(target - range * inward);
+  return std::nullopt;
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,311 @@
+#include "feeler/execution/lattice/localizer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "feeler/execution/contact/continuous_travel.h"
+#include "feeler/execution/contact/fall_in.h"
+#include "feeler/execution/contact/policy_call.h"
+
+namespace feeler::execution {
+namespace {
+
+/// Positions nearer than this, in cells, count as the same: less than any overtravel, more than a tracking error.
+constexpr double kSamePlace = 0.1;
+/// Shorter fast motions cost more than they save.
+constexpr double kShortestFast = 0.75;
+
+/// A chamfer is read up to this much deeper than the face around it, cells.
+constexpr double kRim = 0.6;
+
+/// A touch from coordinate `from` along the direction to where the motion ended, at the place across where it ended.
+Touch MakeTouch(Direction direction, double from, const MotionReport& report) {
+  Touch touch;
+  touch.direction = direction;
+  touch.contact = report.contact;
+  touch.start = report.end;
+  touch.start[AxisOf(direction)] = from;
+  touch.travelled = SignOf(direction) * (report.end[AxisOf(direction)] - from);
+  return touch;
+}
+
+}  // namespace
+
+Localizer::Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
+                     ExecutionRecord& record)
+    : task_(task), problem_(problem), policy_(policy), mover_(mover), record_(record), robot_(problem.start) {
+  for (const planner::Hypothesis& hypothesis : problem.hypotheses) {
+    tracked_.push_back({hypothesis, Eigen::Vector3d::Zero()});
+  }
+}
+
+policies::Belief Localizer::View() const {
+  policies::Belief belief;
+  belief.robot = robot_;
+  for (const TrackedHypothesis& t : tracked_) belief.hypotheses.push_back(t.hypothesis);
+  return belief;
+}
+
+policies::Decision Localizer::Ask() {
+  const policies::Belief belief = View();
+  return CallPolicy(record_, [&] { return policy_.Next(belief); });
+}
+
+bool Localizer::Tell(const Outcome& outcome) {
+  return CallPolicy(record_, [&] { return policy_.Observe(outcome); });
+}
+
+policies::Decision Localizer::Run() {
+  const double before = ThreadCpuSeconds();
+  policy_.Begin(problem_);
+  record_.policy_cpu_s += ThreadCpuSeconds() - before;
+  if (record_.attempts++ == 0) record_.hypotheses = static_cast<int>(problem_.hypotheses.size());
+  while (true) {
+    policies::Decision decision = Ask();
+    if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
+      throw LostTrack("policy gave up: " + give_up->reason);
+    }
+    if (!std::holds_alternative<GuardedMove>(decision)) return decision;
+    // Readings are finer than outcomes: they may tell before the policy does.
+    if (tracked_.size() == 1) return policies::Insert{};
+    const GuardedMove move = std::get<GuardedMove>(decision);
+    if (move.cells < 1 || move.cells > 100000) {
+      throw ExecutionFailure(fmt::format("policy: a guarded move of {} cells", move.cells));
+    }
+    const Cell end = robot_ + move.cells * UnitCell(move.direction);
+    if (!problem_.workspace.Contains(end)) throw ExecutionFailure("policy: a guarded move out of the workspace");
+    if (++record_.policy_moves > mover_.options().motion_limit) {
+      throw ExecutionFailure(fmt::format("limit: {} moves of the policy without a verdict", record_.policy_moves - 1));
+    }
+    Carry(move);
+    if (found_inside_) return policies::Insert{};
+  }
+}
+
+Localizer::Prediction Localizer::Predict(const GuardedMove& move) const {
+  Prediction prediction;
+  prediction.nearest = std::numeric_limits<double>::infinity();
+  for (const TrackedHypothesis& t : tracked_) {
+    const double travel = PredictTravel(*problem_.map, t, Station(), move.direction);
+    prediction.nearest = std::min(prediction.nearest, travel);
+    prediction.farthest = std::max(prediction.farthest, travel);
+    prediction.sure_contact =
+        prediction.sure_contact &&
+        problem_.map->Predict(robot_ - t.hypothesis.offset, move, t.hypothesis.orientation).contact;
+  }
+  return prediction;
+}
+
+void Localizer::Carry(const GuardedMove& move) {
+  // A move ends at a lattice point whatever place it began from.
+  const int axis = AxisOf(move.direction);
+  const double behind = kept_offset_[axis];
+  if (pending_ && *pending_ != move.direction) Flush();
+  if (found_inside_) return;
+  kept_offset_[axis] = 0.0;
+  const Prediction prediction = Predict(move);
+  if (prediction.nearest >= move.cells + mover_.options().free_margin_cells) {
+    Postpone(move);
+    return;
+  }
+  // The station across the motion must hold: come back from an overtravel along another axis first.
+  if (!pending_) {
+    Eigen::Vector3d station = Station();
+    station[axis] += behind;
+    Eigen::Vector3d off = mover_.position() - station;
+    off[axis] = 0.0;
+    if (off.norm() > kSamePlace) {
+      const MotionReport report = mover_.Fast(station, "transfer");
+      if (report.contact) mover_.Retreat(station);
+    }
+  }
+  Feel(move, prediction);
+}
+
+void Localizer::Postpone(const GuardedMove& move) {
+  Touch imagined;
+  imagined.start = Station();
+  imagined.direction = move.direction;
+  imagined.travelled = move.cells;
+  if (!pending_) {
+    // The motion starts at the station: an overtravel along another axis is taken back first.
+    Eigen::Vector3d off = mover_.position() - Station();
+    off[AxisOf(move.direction)] = 0.0;
+    if (off.norm() > kSamePlace) {
+      Eigen::Vector3d station = Station();
+      station[AxisOf(move.direction)] = mover_.position()[AxisOf(move.direction)];
+      const MotionReport report = mover_.Fast(station, "transfer");
+      if (report.contact) mover_.Retreat(station);
+    }
+    pending_ = move.direction;
+  }
+  if (!TakeOver(move, imagined, mover_.options().matching.tolerance_cells)) FailOffTree(imagined);
+}
+
+void Localizer::Flush() {
+  const Direction direction = *pending_;
+  const int axis = AxisOf(direction);
+  while (true) {
+    const double from = mover_.position()[axis];
+    const Eigen::Vector3d target = Station();
+    const double cells = SignOf(direction) * (target[axis] - from);
+    const MotionReport report = mover_.Fast(target, "transfer", std::array<double, 2>{cells, cells});
+    const Touch touch = MakeTouch(direction, from, report);
+    evidence_.push_back(touch);
+    if (!report.contact) break;
+    // Come off, but not farther back than the motion came.
+    mover_.Retreat(report.end - std::min(0.5, std::max(0.0, touch.travelled)) * UnitVector(direction));
+    if (FoundInside()) return;
+    ShiftOffEdge(touch);
+  }
+  pending_.reset();
+}
+
+void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
+  Prediction now = prediction;
+  const double tolerance = mover_.options().matching.tolerance_cells;
+  while (true) {
+    const Eigen::Vector3d begun = mover_.position();
+    const Touch touch = ProbeAlong(move, now);
+    evidence_.push_back(touch);
+    pending_.reset();
+    if (TakeOver(move, touch, tolerance)) {
+      if (touch.contact) RetreatFromContact(move.direction);
+      return;
+    }
+    const bool over_mouth = MayHaveFallenIn(task_, problem_, mover_.position());
+    if (touch.contact) mover_.Retreat(touch.end() - std::min(0.5, touch.travelled) * UnitVector(move.direction));
+    if (FoundInside()) return;
+    // Not inside, but on the rim of the opening, perhaps: its chamfer is met deeper than the closed face.
+    if (over_mouth && touch.contact && move.direction == task_.insertion && TakeOver(move, touch, tolerance + kRim)) {
+      mover_.Retreat(Station());
+      return;
+    }
+    mover_.Retreat(begun);  // to where it began, for the other side of the edge
+    ShiftOffEdge(touch);
+    now = Predict(move);
+  }
+}
+
+Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& prediction) {
+  const ExecutorOptions& options = mover_.options();
+  const int axis = AxisOf(move.direction);
+  const int sign = SignOf(move.direction);
+  const Eigen::Vector3d station = Station();
+  const double from = mover_.position()[axis];
+  const double overtravel = prediction.sure_contact ? options.sure_overtravel_cells : options.overtravel_cells;
+  const double end = station[axis] + sign * (move.cells + overtravel);
+  const double behind = sign * (station[axis] - from);  // positive: a pending motion lies before the move
+  const PredictedCells predicted = std::array<double, 2>{prediction.nearest + behind, prediction.farthest + behind};
+
+  const double fast = std::min<double>(move.cells, prediction.nearest - options.fast_margin_cells);
+  if (fast + behind >= kShortestFast) {
+    Eigen::Vector3d target = station;
+    target[axis] += sign * fast;
+    const MotionReport report = mover_.Fast(target, "transfer", predicted);
+    if (report.contact) {
+      // A contact at speed is read late: come off and feel again slowly.
+      mover_.Retreat(report.end - UnitVector(move.direction));
+    }
+  }
+  const double gone = sign * (mover_.position()[axis] - from);
+  const PredictedCells left = std::array<double, 2>{(*predicted)[0] - gone, (*predicted)[1] - gone};
+  return MakeTouch(move.direction, from, mover_.Probe(move.direction, end, "probe", left));
+}
+
+bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells) {
+  const MatchOptions matching{tolerance_cells};
+  const std::vector<OutcomeMatch> matches = MatchOutcomes(*problem_.map, tracked_, robot_, move, touch, matching);
+  for (const OutcomeMatch& match : matches) {
+    if (!Tell(match.outcome)) continue;
+    if (touch.contact) {
+      const TrackedHypothesis& best = tracked_[match.best];
+      const int axis = AxisOf(touch.direction);
+      const double travel = PredictTravel(*problem_.map, best, touch.start, touch.direction);
+      anchor_[axis] = best.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
+    }
+    const int outcomes = CountOutcomes(move);
+    Settle(*problem_.map, robot_, move, touch, match.outcome, matching, tracked_);
+    LogDecision(move, match.outcome, outcomes);
+    robot_ += match.outcome.cells * UnitCell(move.direction);
+    return true;
+  }
+  if (!matches.empty()) throw LostTrack("policy: no branch for any outcome that explains the reading");
+  return false;
+}
+
+int Localizer::CountOutcomes(const GuardedMove& move) const {
+  std::set<std::pair<int, bool>> outcomes;
+  for (const TrackedHypothesis& t : tracked_) {
+    const Outcome outcome = problem_.map->Predict(robot_ - t.hypothesis.offset, move, t.hypothesis.orientation);
+    outcomes.emplace(outcome.cells, outcome.contact);
+  }
+  return static_cast<int>(outcomes.size());
+}
+
+void Localizer::LogDecision(const GuardedMove& move, const Outcome& outcome, int outcomes) {
+  DecisionRecord decision;
+  decision.attempt = record_.attempts - 1;
+  decision.motions = static_cast<int>(record_.moves.size());
+  decision.direction = ToString(move.direction);
+  decision.cells = move.cells;
+  decision.travelled_cells = outcome.cells;
+  decision.contact = outcome.contact;
+  decision.outcomes = outcomes;
+  // Those left stand in the order of the problem.
+  std::size_t index = 0;
+  for (const TrackedHypothesis& t : tracked_) {
+    while (problem_.hypotheses.at(index).offset != t.hypothesis.offset ||
+           problem_.hypotheses[index].orientation != t.hypothesis.orientation) {
+      ++index;
+    }
+    decision.left.push_back(static_cast<int>(index++));
+  }
+  record_.decisions.push_back(std::move(decision));
+}
+
+bool Localizer::FoundInside() {
+  if (!MayHaveFallenIn(task_, problem_, mover_.position())) return false;
+  found_inside_ = LocateFromInside(task_, problem_, mover_);
+  return found_inside_.has_value();
+}
+
+void Localizer::ShiftOffEdge(const Touch& touch) {
+  const std::optional<Eigen::Vector3d> shift = GrazeShift(*problem_.map, tracked_, touch, mover_.options().matching);
+  if (!shift || record_.grazes >= mover_.options().graze_attempts) FailOffTree(touch);
+  ++record_.grazes;
+  anchor_ += *shift;
+  for (TrackedHypothesis& t : tracked_) t.anchor += *shift;
+  mover_.Retreat(mover_.position() + *shift);
+}
+
+void Localizer::RetreatFromContact(Direction direction) {
+  const int axis = AxisOf(direction);
+  const double room = std::max(mover_.Cells(mover_.options().retreat_m), 0.0);
+  const Eigen::Vector3d station = Station();
+  const double wall = mover_.position()[axis];
+  const double to_wall = SignOf(direction) * (wall - station[axis]);
+  if (to_wall < room) kept_offset_[axis] = SignOf(direction) * (to_wall - room);
+  mover_.Retreat(Station());
+}
+
+void Localizer::FailOffTree(const Touch& touch) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const TrackedHypothesis& t : tracked_) {
+    const double travel = PredictTravel(*problem_.map, t, touch.start, touch.direction);
+    if (std::abs(travel - touch.travelled) < std::abs(nearest - touch.travelled)) nearest = travel;
+  }
+  const double cell_mm = 1e3 * mover_.frame().cell_m;
+  const std::string expected = nearest < 1e6 ? fmt::format("nearest prediction {:.2f} mm", nearest * cell_mm)
+                                             : std::string("no contact predicted");
+  throw LostTrack(fmt::format("off the policy tree: {} after {:.2f} mm of {}, {} ({} hypotheses left)",
+                              touch.contact ? "contact" : "no contact", touch.travelled * cell_mm,
+                              ToString(touch.direction), expected, tracked_.size()));
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "feeler/core/task.h"
+#include "feeler/execution/contact/contact_evidence.h"
+#include "feeler/execution/contact/mover.h"
+#include "feeler/execution/lattice/outcome_matching.h"
+#include "feeler/planner/belief/problem.h"
+#include "feeler/policies/policy.h"
+
+namespace feeler::execution {
+
+/// Walks a policy on a robot whose target stands anywhere between the lattice points: turns the policy's moves into
+/// motions, what was felt into outcomes, and keeps the hypotheses that explain it.
+///
+/// The lattice of the policy is tied to the world by an anchor. A contact tells where between two lattice points a wall
+/// stands; the lattice is shifted along that axis so that the wall stands where the hypothesis says (mid-cell), and
+/// later decisions along the axis are no longer near a tie.
+class Localizer {
+ public:
+  /// All arguments outlive the localizer. The tool stands at the start cell of the problem.
+  Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
+            ExecutionRecord& record);
+
+  /// Until the policy has no further guarded move (its last decision is returned, but for GiveUp), one hypothesis is
+  /// left, or the tool fell into the opening (both: Insert). Throws ExecutionFailure, also for whatever the policy
+  /// throws once the episode has begun; what its Begin throws is passed on.
+  policies::Decision Run();
+
+  /// Set if the tool fell into the opening and felt where it is: the position of the target (lattice coordinates).
+  const std::optional<Eigen::Vector3d>& found_inside() const { return found_inside_; }
+
+  const std::vector<TrackedHypothesis>& hypotheses() const { return tracked_; }
+  const std::vector<Touch>& evidence() const { return evidence_; }
+
+ private:
+  struct Prediction {
+    double nearest = 0.0;      ///< least travel under a hypothesis, cells from the lattice point of the robot cell
+    double farthest = 0.0;     ///< greatest
+    bool sure_contact = true;  ///< every hypothesis has a contact in lattice terms
+  };
+
+  policies::Belief View() const;
+  policies::Decision Ask();
+  bool Tell(const Outcome& outcome);
+  /// Where the tool is to stand in the present robot cell.
+  Eigen::Vector3d Station() const { return robot_.cast<double>() + problem_.map->phase() + anchor_ + kept_offset_; }
+  Prediction Predict(const GuardedMove& move) const;
+
+  void Carry(const GuardedMove& move);
+  /// Takes a move that is known to be free into the pending motion.
+  void Postpone(const GuardedMove& move);
+  /// Carries out the pending motion.
+  void Flush();
+  void Feel(const GuardedMove& move, const Prediction& prediction);
+  Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
+  /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
+  /// the tolerance (cells).
+  bool TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells);
+  /// Writes the answer to a move of the policy into the record. `outcomes`: that could have been.
+  void LogDecision(const GuardedMove& move, const Outcome& outcome, int outcomes);
+  /// Different outcomes of a move under the hypotheses left.
+  int CountOutcomes(const GuardedMove& move) const;
+  /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
+  bool FoundInside();
+  /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.
+  void ShiftOffEdge(const Touch& touch);
+  void RetreatFromContact(Direction direction);
+  [[noreturn]] void FailOffTree(const Touch& touch) const;
+
+  const Task& task_;
+  const planner::Problem& problem_;
+  policies::Policy& policy_;
+  Mover& mover_;
+  ExecutionRecord& record_;
+  std::vector<TrackedHypothesis> tracked_;
+  std::vector<Touch> evidence_;
+  Cell robot_;
+  Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
+  std::optional<Eigen::Vector3d> found_inside_;
+  std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()
+};
+
+}  // namespace feeler::execution

@@ -1,0 +1,274 @@
+#include "feeler/execution/recovery/fallback_ladder.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "feeler/execution/contact/insertion.h"
+#include "feeler/execution/contact/spiral_search.h"
+#include "feeler/execution/contact/wall_touch.h"
+#include "feeler/execution/lattice/yaw_fit.h"
+#include "feeler/execution/recovery/online_planner.h"
+#include "feeler/planner/family/problem_family.h"
+
+namespace feeler::execution {
+namespace {
+
+/// How far outside the start belief a truth is looked for, m.
+constexpr double kBeyond_m = 0.0055;
+/// A refit with axes wider than this, to both sides, needs a plan; below, the confirming touches find it.
+constexpr double kNarrow_m = 0.004;
+constexpr int kRetries = 2;
+constexpr double kDegree = std::numbers::pi / 180.0;
+/// A turn smaller than this is not worth turning the frame for.
+constexpr double kSmallestTurn_rad = 0.2 * kDegree;
+/// More than a confirming touch tells; a target that is turned farther was not the one that was felt.
+constexpr double kLargestTurn_rad = 8.0 * kDegree;
+constexpr double kSweep_rad[] = {1.0 * kDegree,  -1.0 * kDegree, 2.0 * kDegree,
+                                 -2.0 * kDegree, 3.0 * kDegree,  -3.0 * kDegree};
+/// The tool comes off the mouth by this before it goes elsewhere, cells.
+constexpr double kOff = 1.5;
+
+void Log(const Episode& episode, const char* rung, std::string reason) {
+  episode.record.ladder.push_back({rung, std::move(reason)});
+}
+
+Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
+  return {episode.robot, frame, episode.options, episode.record, episode.started_s};
+}
+
+/// Takes over what an insertion in `frame` at `target` came to.
+void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
+              const BelievedInsertion& verdict, Attempt& attempt) {
+  episode.record.world_T_estimate = frame.ToWorld(target);
+  episode.record.localized = true;
+  episode.record.inserted = verdict.inserted;
+  attempt.reason = verdict.reason;
+  attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
+}
+
+/// Off whatever the tool stands on, straight out of the opening.
+void ComeOff(const Task& task, const Eigen::Vector3d& target, Mover& mover) {
+  const int axis = AxisOf(task.insertion);
+  const double out = -SignOf(task.insertion);
+  Eigen::Vector3d place = mover.position();
+  const double height = target[axis] + out * kOff;
+  if (out * (height - place[axis]) > 0.0) place[axis] = height;
+  mover.Retreat(place);
+}
+
+/// Rungs 1 and 2. True: inserted, or blocked at a place that the touches agree on.
+void Refit(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
+  if (attempt.evidence.empty()) return;
+  const Task& task = episode.task;
+  Log(episode, rung::kRefit, attempt.reason);
+  const Eigen::Vector3d beyond = Eigen::Vector3d::Constant(kBeyond_m / task.cell_m);
+  const Region region{attempt.possible.lower - beyond, attempt.possible.upper + beyond};
+  const TargetFit fit = FitTargetAnywhere(*problem.map, attempt.evidence, region.lower, region.upper,
+                                          attempt.orientation, episode.options.fit);
+  attempt.target = fit.position;
+  attempt.spread = fit.half_width;
+  attempt.sure = false;
+  const double widest = 2.0 * fit.half_width.maxCoeff() * task.cell_m;
+  if (fit.violations > 0 || widest > kNarrow_m) return;
+
+  Log(episode, rung::kInsertOnRefit, fmt::format("spread {:.1f} mm", 1e3 * widest));
+  Mover mover = MoverFor(episode, attempt.frame);
+  try {
+    const Eigen::Vector3d margin = fit.half_width + Eigen::Vector3d::Constant(1.0);
+    const Region likely{(fit.position - margin).cwiseMax(region.lower), (fit.position + margin).cwiseMin(region.upper)};
+    const TargetFit confirmed =
+        Confirm(*problem.map, task.insertion, attempt.orientation, likely, region, mover, attempt.evidence);
+    attempt.target = confirmed.position;
+    attempt.spread = confirmed.half_width;
+    attempt.sure = IsSure(task, confirmed);
+    RecordEstimate(episode, attempt.frame, confirmed);
+    Conclude(episode, attempt.frame, confirmed.position,
+             ApproachAndInsert(task, *problem.map, confirmed.position, attempt.orientation, mover, attempt.evidence),
+             attempt);
+  } catch (const LostTrack& lost) {
+    attempt.end = AttemptEnd::kLost;
+    attempt.reason = lost.what();
+  }
+}
+
+/// Inserts with the tool turned by `yaw_rad` about the target.
+bool InsertTurned(const Episode& episode, const planner::Problem& problem, double yaw_rad, Attempt& attempt) {
+  const LatticeFrame turned = TurnedFrame(attempt.frame, episode.task.insertion, *attempt.target, yaw_rad);
+  Mover mover = MoverFor(episode, turned);
+  ComeOff(episode.task, Eigen::Vector3d::Zero(), mover);
+  std::vector<Touch> ignored;
+  Attempt trial = attempt;
+  Conclude(episode, turned, Eigen::Vector3d::Zero(),
+           ApproachAndInsert(episode.task, *problem.map, Eigen::Vector3d::Zero(), attempt.orientation, mover, ignored),
+           trial);
+  if (trial.end == AttemptEnd::kInserted) attempt = std::move(trial);
+  return attempt.end == AttemptEnd::kInserted;
+}
+
+/// Feels how far the target is turned; from then on the frame of the attempt is turned with it. Leaves the attempt lost
+/// if the touches do not find the target where it is believed.
+void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
+  const Task& task = episode.task;
+  const planner::ContactMap& map = *problem.map;
+  Mover mover = MoverFor(episode, attempt.frame);
+  ComeOff(task, *attempt.target, mover);
+  const std::optional<YawFit> fit =
+      MeasureYaw(task, map, *attempt.target, attempt.orientation, mover, attempt.evidence);
+  const bool sound = fit && std::abs(fit->yaw_rad) <= kLargestTurn_rad;
+  Log(episode, rung::kYawFit,
+      sound ? fmt::format("{}; measured {:.2f} deg", attempt.reason, fit->yaw_rad / kDegree)
+            : attempt.reason + "; no wall tells");
+  if (!sound) {
+    // Where everything else agrees the place is right, and turns can still be tried.
+    if (!attempt.sure) attempt.end = AttemptEnd::kLost;
+    return;
+  }
+  const double yaw_rad = std::abs(fit->yaw_rad) < kSmallestTurn_rad ? 0.0 : fit->yaw_rad;
+  const LatticeFrame turned = TurnedFrame(attempt.frame, task.insertion, *attempt.target, yaw_rad);
+  Mover turned_mover = MoverFor(episode, turned);
+  const auto centre = Recenter(task, map, Eigen::Vector3d::Zero(), attempt.orientation, turned_mover);
+  if (!centre) {
+    attempt.end = AttemptEnd::kLost;
+    attempt.reason = "yaw fit: the sides of the target are not where they should be";
+    return;
+  }
+  // From here on the attempt is one in the turned frame.
+  attempt.evidence.clear();
+  attempt.frame = turned;
+  attempt.target = *centre;
+  attempt.possible = {*centre - Eigen::Vector3d::Ones(), *centre + Eigen::Vector3d::Ones()};
+  attempt.spread = Eigen::Vector3d::Constant(0.1);
+  attempt.sure = true;
+  Conclude(episode, turned, *centre,
+           ApproachAndInsert(task, map, *centre, attempt.orientation, turned_mover, attempt.evidence), attempt);
+}
+
+void SweepYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
+  Log(episode, rung::kYawSweep, attempt.reason);
+  for (const double yaw_rad : kSweep_rad) {
+    if (InsertTurned(episode, problem, yaw_rad, attempt)) return;
+  }
+}
+
+void Spiral(const Episode& episode, Attempt& attempt) {
+  Log(episode, rung::kSpiral, attempt.reason);
+  Mover mover = MoverFor(episode, attempt.frame);
+  ComeOff(episode.task, *attempt.target, mover);
+  const auto found = FindBySpiral(episode.task, *attempt.target, {}, mover);
+  if (!found) {
+    attempt.end = AttemptEnd::kLost;
+    attempt.reason = "spiral: no opening found";
+    return;
+  }
+  Conclude(episode, attempt.frame, found->target,
+           found->at_bottom ? BelievedInsertion{true, false, "inserted"}
+                            : InsertFromHere(episode.task, found->target, mover),
+           attempt);
+}
+
+void TryAtMouth(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
+  try {
+    FitYaw(episode, problem, attempt);
+    if (attempt.end == AttemptEnd::kBlocked) SweepYaw(episode, problem, attempt);
+    if (attempt.end == AttemptEnd::kBlocked) Spiral(episode, attempt);
+  } catch (const LostTrack& lost) {
+    attempt.end = AttemptEnd::kLost;
+    attempt.reason = lost.what();
+  }
+}
+
+/// Out of the opening, over the start pose of the problem, and down to it.
+void GoToStart(const Episode& episode, const planner::Problem& problem, const LatticeFrame& frame) {
+  Mover mover = MoverFor(episode, frame);
+  const int axis = AxisOf(episode.task.insertion);
+  const double out = -SignOf(episode.task.insertion);
+  const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();
+  Eigen::Vector3d up = mover.position();
+  up[axis] = out * std::max(out * up[axis] + 1.0, out * start[axis]);
+  mover.Retreat(up);
+  Eigen::Vector3d over = start;
+  over[axis] = up[axis];
+  if ((over - up).norm() > 0.05 && mover.Fast(over, "transfer").contact) {
+    throw ExecutionFailure("ladder: contact on the way back to the start");
+  }
+  if ((start - over).norm() > 0.05 && mover.Fast(start, "transfer").contact) {
+    throw ExecutionFailure("ladder: contact at the start of the new attempt");
+  }
+}
+
+int CellsFor(double half_width, int most) {
+  return std::clamp(2 * static_cast<int>(std::ceil(half_width + 0.5)) + 1, 3, std::max(3, most));
+}
+
+/// The next attempt; empty if no policy for it was found.
+std::optional<Attempt> NewAttempt(const Episode& episode, const planner::Problem& like, const Pose& world_T_estimate,
+                                  const planner::Extents& extents, OnlinePlanner& planner) {
+  const planner::Problem problem = planner::MakeCuboidProblem(episode.task, like.map, extents);
+  const std::unique_ptr<policies::Policy> policy = planner.PolicyFor(problem);
+  if (!policy) return std::nullopt;
+  GoToStart(episode, problem, FrameOf(episode.task, problem, world_T_estimate));
+  return RunAttempt(episode, problem, world_T_estimate, *policy);
+}
+
+/// Hypotheses along each axis of the task (1 where it is certain) around a refit.
+planner::Extents ExtentsAround(const Task& task, const Eigen::Vector3d& spread) {
+  const Cell largest = LargestPositionExtents(task);
+  int counts[3];
+  for (int axis = 0; axis < 3; ++axis) counts[axis] = CellsFor(spread[axis], largest[axis]);
+  return {counts[0], counts[1], counts[2]};
+}
+
+planner::Extents WithMargin(const Task& task, const planner::Problem& problem) {
+  Cell least = problem.hypotheses.front().offset;
+  Cell most = least;
+  for (const planner::Hypothesis& h : problem.hypotheses) {
+    least = least.cwiseMin(h.offset);
+    most = most.cwiseMax(h.offset);
+  }
+  const int margin = static_cast<int>(std::ceil(0.004 / task.cell_m));
+  const Cell size = most - least + Cell::Ones() + Cell::Constant(2 * margin);
+  return {size.x(), size.y(), size.z()};
+}
+
+}  // namespace
+
+std::string ClimbLadder(const Episode& episode, const planner::Problem& problem, const Pose& world_T_estimate,
+                        Attempt attempt) {
+  std::shared_ptr<OnlinePlanner> planner = episode.options.online_planner;
+  if (!planner) planner = std::make_shared<OnlinePlanner>();
+  for (int retry = 0;; ++retry) {
+    // A blocked insertion at a place that every touch agrees on needs no other place.
+    if (!(attempt.end == AttemptEnd::kBlocked && attempt.sure)) Refit(episode, problem, attempt);
+    if (attempt.end == AttemptEnd::kBlocked) TryAtMouth(episode, problem, attempt);
+    if (attempt.end == AttemptEnd::kInserted) return attempt.reason;
+    if (retry == kRetries) break;
+
+    std::optional<Attempt> next;
+    if (retry == 0 && attempt.target) {
+      Log(episode, rung::kResolve, attempt.reason);
+      next = NewAttempt(episode, problem, attempt.frame.ToWorld(*attempt.target),
+                        ExtentsAround(episode.task, attempt.spread), *planner);
+    } else {
+      Log(episode, rung::kWholeCuboid, attempt.reason);
+      next = NewAttempt(episode, problem, world_T_estimate, WithMargin(episode.task, problem), *planner);
+    }
+    if (!next) {
+      attempt.end = AttemptEnd::kLost;
+      attempt.reason = "ladder: no policy within the budget";
+      continue;
+    }
+    attempt = std::move(*next);
+    if (attempt.end == AttemptEnd::kInserted) return attempt.reason;
+  }
+  Log(episode, rung::kGiveUp, attempt.reason);
+  return attempt.reason;
+}
+
+}  // namespace feeler::execution

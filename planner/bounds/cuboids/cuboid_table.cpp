@@ -1,0 +1,283 @@
+#include "feeler/planner/bounds/cuboids/cuboid_table.h"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+#include <utility>
+
+#include "feeler/planner/bounds/cuboids/box_partition.h"
+
+namespace feeler::planner {
+namespace {
+
+template <class F>
+void ForEachCell(const CellBox& box, F f) {
+  for (int z = box.min.z(); z <= box.max.z(); ++z) {
+    for (int y = box.min.y(); y <= box.max.y(); ++y) {
+      for (int x = box.min.x(); x <= box.max.x(); ++x) f(Cell(x, y, z));
+    }
+  }
+}
+
+/// Of a grid of `size` cells, x fastest.
+struct Strides {
+  explicit Strides(const Cell& size) : along{1, size.x(), std::int64_t{size.x()} * size.y()} {}
+  std::array<std::int64_t, 3> along;
+};
+
+/// out(x) = OR over i < count of in(x - i) along an axis; cells before the first are like the first, beyond the last
+/// like the last.
+void OrAlong(int axis, int count, const Cell& in_size, const std::vector<std::uint8_t>& in, const Cell& out_size,
+             std::vector<std::uint8_t>& out) {
+  out.assign(static_cast<std::size_t>(out_size.prod()), 0);
+  const Strides in_strides(in_size);
+  const int inner = axis == 0 ? 1 : axis == 1 ? out_size.x() : out_size.x() * out_size.y();
+  const int outer = axis == 0 ? out_size.y() * out_size.z() : axis == 1 ? out_size.z() : 1;
+  for (int o = 0; o < outer; ++o) {
+    for (int p = 0; p < out_size[axis]; ++p) {
+      std::uint8_t* const to =
+          &out[(static_cast<std::size_t>(o) * static_cast<std::size_t>(out_size[axis]) + static_cast<std::size_t>(p)) *
+               static_cast<std::size_t>(inner)];
+      const int first = std::clamp(p - count + 1, 0, in_size[axis] - 1);
+      const int last = std::min(p, in_size[axis] - 1);
+      for (int q = first; q <= last; ++q) {
+        const std::uint8_t* const from =
+            &in[(static_cast<std::size_t>(o) * static_cast<std::size_t>(in_size[axis]) + static_cast<std::size_t>(q)) *
+                static_cast<std::size_t>(inner)];
+        for (int i = 0; i < inner; ++i) to[i] |= from[i];
+      }
+    }
+  }
+}
+
+}  // namespace
+
+struct CuboidTable::Scratch {
+  std::vector<std::uint8_t> flags, buffer;
+  std::vector<Bits256> hit, missed, layers;
+  std::vector<HypothesisBox> boxes;
+};
+
+CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
+                         const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs)
+    : spread_(spread), largest_(largest.cwiseMin(kLongest)) {
+  const TableUnits units(costs);
+  unit_ = units.unit;
+  free_units_ = units.free_units;
+  contact_units_ = units.contact_units;
+  const ActiveRegion region(map);
+  active_ = {region.box.min - Cell::Ones(), region.box.max + Cell::Ones()};
+  mirrored_ = region.mirrored;
+  free_above_ = region.free_above;
+  free_below_ = region.free_below;
+  FillFlags(map);
+  FitIntoMemory(map.orientations());
+  planes_.resize(static_cast<std::size_t>(largest_.prod() * map.orientations()));
+  const Source source{masks, certificates};
+  // A cuboid is cut into smaller ones: their extents have a smaller sum. Those of equal sum are independent.
+  std::vector<Scratch> scratch(static_cast<std::size_t>(jobs.threads()));
+  for (int sum = 4; sum <= largest_.sum(); ++sum) {
+    std::vector<std::pair<Cell, int>> level;
+    ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
+      if (size.sum() != sum || Goal(size)) return;
+      for (int o = 0; o < map.orientations(); ++o) level.emplace_back(size, o);
+    });
+    std::atomic<std::size_t> next = 0;
+    const auto work = [&](Scratch& mine) {
+      for (std::size_t i = next++; i < level.size(); i = next++) Fill(source, level[i].first, level[i].second, mine);
+    };
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 1; i < scratch.size(); ++i) threads.emplace_back([&work, &scratch, i] { work(scratch[i]); });
+    work(scratch.front());
+  }
+}
+
+void CuboidTable::FillFlags(const ContactMap& map) {
+  for (int o = 0; o < map.orientations(); ++o) {
+    std::vector<std::uint8_t>& flags = flags_.emplace_back();
+    ForEachCell(active_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, o)); });
+  }
+}
+
+CuboidTable::Plane CuboidTable::Shape(const Cell& size) const {
+  Plane plane;
+  plane.whole = active_.Size() + size - Cell::Ones();
+  plane.stored = plane.whole;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (mirrored_[static_cast<std::size_t>(axis)]) plane.stored[axis] = (plane.whole[axis] + 1) / 2;
+  }
+  return plane;
+}
+
+void CuboidTable::FitIntoMemory(int orientations) {
+  while (true) {
+    std::size_t bytes = 0;
+    ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
+      if (Goal(size)) return;
+      const Cell stored = Shape(size).stored;
+      bytes += static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
+               static_cast<std::size_t>(stored.z()) * sizeof(std::uint32_t) * static_cast<std::size_t>(orientations);
+    });
+    if (bytes <= kMostBytes || largest_.maxCoeff() <= 1) return;
+    largest_ = largest_.cwiseMin(largest_.maxCoeff() - 1);
+  }
+}
+
+std::uint32_t CuboidTable::At(const Cell& displacement, const Cell& size, int orientation) const {
+  if (Goal(size)) return 0;
+  const Plane& plane = planes_[PlaneIndex(size, orientation)];
+  Cell cell = displacement - active_.min;
+  int beyond = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    if (cell[axis] < 0) {
+      if (free_below_[i]) beyond -= cell[axis];
+      cell[axis] = 0;
+    } else if (cell[axis] >= plane.whole[axis]) {
+      if (free_above_[i]) beyond += cell[axis] - plane.whole[axis] + 1;
+      cell[axis] = plane.whole[axis] - 1;
+    }
+    if (cell[axis] >= plane.stored[axis]) cell[axis] = plane.whole[axis] - 1 - cell[axis];
+  }
+  const std::uint32_t value = plane.values[static_cast<std::size_t>(
+      (std::int64_t{cell.z()} * plane.stored.y() + cell.y()) * plane.stored.x() + cell.x())];
+  if (value == kUnreachable) return value;
+  return value + static_cast<std::uint32_t>(beyond * size.prod()) * free_units_;
+}
+
+std::uint64_t CuboidTable::Certificates(const Source& source, const std::vector<Bits256>& layers,
+                                        const HypothesisBox& box, const Cell& displacement, int orientation) const {
+  const auto holds = [&](const Cell& h) {
+    return (h.array() >= 0).all() && h.x() < kLongest && h.y() < kLongest && h.z() < static_cast<int>(layers.size()) &&
+           layers[static_cast<std::size_t>(h.z())].Test(h.x() + kLongest * h.y());
+  };
+  double sum = 0.0;
+  bool apart = true;
+  ForEachCell({box.low, box.low + box.size - Cell::Ones()}, [&](const Cell& h) {
+    int mask = 0;
+    for (std::size_t i = 0; i < source.certificates.neighbours().size(); ++i) {
+      if (holds(h + source.certificates.neighbours()[i])) mask |= 1 << i;
+    }
+    const std::uint16_t value = source.certificates.At(displacement - h, mask, orientation);
+    apart = apart && value != kNoCertificate;
+    sum += value;
+  });
+  if (!apart) return kUnreachable;
+  return static_cast<std::uint64_t>(sum * (source.certificates.grid().unit / unit_));
+}
+
+std::uint64_t CuboidTable::BestPartition(const Source& source, const std::vector<Bits256>& layers,
+                                         const Cell& displacement, int orientation, Scratch& scratch) const {
+  std::uint64_t best = 0;
+  for (const AxisOrder& order : kAxisOrders) {
+    scratch.layers = layers;
+    PartitionIntoBoxes(scratch.layers, order, largest_, scratch.boxes);
+    std::uint64_t sum = 0;
+    for (const HypothesisBox& box : scratch.boxes) {
+      std::uint64_t value = At(displacement - box.low, box.size, orientation);
+      if (value != kUnreachable && box.size.prod() <= kSmallBox) {
+        value = std::max(value, Certificates(source, layers, box, displacement, orientation));
+      }
+      if (value == kUnreachable) return kUnreachable;
+      sum += value;
+    }
+    best = std::max(best, sum);
+    if (scratch.boxes.size() == 1) break;
+  }
+  return std::min<std::uint64_t>(best, kUnreachable - 1);
+}
+
+void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch) {
+  const ContactMasks& masks = source.masks;
+  Plane& plane = planes_[PlaneIndex(size, orientation)];
+  plane = Shape(size);
+  const Cell& stored = plane.stored;
+  const Strides strides(stored);
+  // The OR over the cuboid of the flags of its hypotheses.
+  Cell shape = active_.Size();
+  scratch.flags = flags_[static_cast<std::size_t>(orientation)];
+  for (int axis = 0; axis < 3; ++axis) {
+    const Cell before = shape;
+    shape[axis] = stored[axis];
+    OrAlong(axis, size[axis], before, scratch.flags, shape, scratch.buffer);
+    scratch.flags.swap(scratch.buffer);
+  }
+
+  const auto whole = static_cast<std::uint32_t>(size.prod());
+  const std::uint32_t step_cost = whole * free_units_;
+  const Bits256 window = Rectangle(0, 0, size.x(), size.y());
+  const auto depth = static_cast<std::size_t>(size.z());
+  scratch.hit.resize(depth);
+  scratch.missed.resize(depth);
+  plane.values.assign(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
+                          static_cast<std::size_t>(stored.z()),
+                      kUnreachable);
+  // Steps that split the cuboid.
+  std::size_t at = 0;
+  ForEachCell({Cell::Zero(), stored - Cell::Ones()}, [&](const Cell& cell) {
+    const std::size_t here = at++;
+    std::uint8_t& flags = scratch.flags[here];
+    if ((flags & kOutOfReach) != 0) {
+      flags = 0x3F;
+      return;
+    }
+    const Cell displacement = active_.min + cell;
+    std::uint32_t& best = plane.values[here];
+    for (const Direction d : kDirections) {
+      const unsigned bit = 1U << IndexOf(d);
+      const int next = cell[AxisOf(d)] + SignOf(d);
+      if ((flags & bit) == 0) {
+        // A step out of what is stored changes nothing: outside all repeats, or is the mirror image of the inside.
+        if (next < 0 || next >= stored[AxisOf(d)]) flags |= static_cast<std::uint8_t>(bit);
+        continue;
+      }
+      std::uint32_t hits = 0;
+      for (std::size_t z = 0; z < depth; ++z) {
+        scratch.hit[z] =
+            masks.Mask(masks.Index(displacement - Cell(0, 0, static_cast<int>(z)), d, orientation)) & window;
+        hits += static_cast<std::uint32_t>(scratch.hit[z].Count());
+        scratch.missed[z] = window.Without(scratch.hit[z]);
+      }
+      if (hits == 0 || hits == whole) continue;
+      const bool stays = next < 0 || next >= plane.whole[AxisOf(d)];
+      const std::uint64_t after_hit = BestPartition(source, scratch.hit, displacement, orientation, scratch);
+      if (after_hit == kUnreachable) continue;
+      const std::uint64_t after_miss = BestPartition(
+          source, scratch.missed, stays ? displacement : Cell(displacement + UnitCell(d)), orientation, scratch);
+      if (after_miss == kUnreachable) continue;
+      const std::uint64_t value =
+          after_hit + after_miss + std::uint64_t{hits} * contact_units_ + std::uint64_t{whole - hits} * free_units_;
+      best = static_cast<std::uint32_t>(std::min<std::uint64_t>(best, value));
+    }
+  });
+  // Steps that show nothing, until nothing changes: values are settled by a few sweeps to and fro.
+  const auto relax = [&](std::size_t here) {
+    const unsigned flags = scratch.flags[here];
+    if (flags == 0x3F) return false;
+    const std::uint32_t before = plane.values[here];
+    std::uint32_t best = before;
+    for (const Direction d : kDirections) {
+      if ((flags >> IndexOf(d) & 1) != 0) continue;
+      const std::uint32_t there = plane.values[static_cast<std::size_t>(
+          static_cast<std::int64_t>(here) + SignOf(d) * strides.along[static_cast<std::size_t>(AxisOf(d))])];
+      if (there < kUnreachable - step_cost) best = std::min(best, there + step_cost);
+    }
+    plane.values[here] = best;
+    return best < before;
+  };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t i = 0; i < plane.values.size(); ++i) changed = relax(i) || changed;
+    if (!changed) break;
+    changed = false;
+    for (std::size_t i = plane.values.size(); i-- > 0;) changed = relax(i) || changed;
+  }
+}
+
+std::size_t CuboidTable::bytes() const {
+  std::size_t bytes = 0;
+  for (const Plane& plane : planes_) bytes += plane.values.size() * sizeof(plane.values[0]);
+  return bytes;
+}
+
+}  // namespace feeler::planner

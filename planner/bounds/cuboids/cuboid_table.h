@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "feeler/core/lattice.h"
+#include "feeler/core/parallelism.h"
+#include "feeler/planner/belief/contact_masks.h"
+#include "feeler/planner/bounds/certificates/certificate_grid.h"
+#include "feeler/planner/bounds/certificates/certificate_table.h"
+#include "feeler/planner/bounds/cuboids/box_partition.h"
+#include "feeler/planner/contact/contact_map.h"
+
+namespace feeler::planner {
+
+/// Lower bounds on the cost of localizing every cuboid of hypotheses up to a size, from every displacement of the tool,
+/// times the number of hypotheses. Computed by single steps (see StepCosts), smaller cuboids first; a step that splits
+/// a cuboid leads to boxes into which the parts are cut, and w(H) V(r,H) >= sum of w(Hi) V(r,Hi) over a partition.
+/// Exact for distance as cost where every part is a box again.
+///
+/// A map that is its own mirror image along an axis needs half of the table. Tables beyond kMostBytes are not built:
+/// `largest` is what fits. Immutable; safe to read from many threads.
+class CuboidTable {
+ public:
+  static constexpr std::uint32_t kUnreachable = ~std::uint32_t{0};
+  static constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+  static constexpr int kLongest = 16;
+  /// Boxes of at most so many hypotheses are bounded by their certificates too, which look beyond the box.
+  static constexpr int kSmallBox = 8;
+
+  /// Cuboids of up to `largest` hypotheses per axis (at most 16 count). `masks` are of `map`. The values do not depend
+  /// on the number of threads.
+  /// `certificates` are of `map`, the goal and costs at most these; they bound what is left in small boxes.
+  CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
+              const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs);
+
+  const Cell& largest() const { return largest_; }
+  double unit() const { return unit_; }
+  /// A belief of this size is a goal: its value is zero, and no table is kept.
+  bool Goal(const Cell& size) const { return ((size - Cell::Ones()).array() <= spread_.array()).all(); }
+  /// In table units, times the number of hypotheses; `displacement` from the least hypothesis of the cuboid.
+  std::uint32_t At(const Cell& displacement, const Cell& size, int orientation) const;
+  std::size_t bytes() const;
+
+ private:
+  struct Plane {
+    Cell whole = Cell::Zero();   ///< cells of the grid
+    Cell stored = Cell::Zero();  ///< of them up to the middle along mirrored axes
+    std::vector<std::uint32_t> values;
+  };
+  struct Scratch;
+  struct Source {
+    const ContactMasks& masks;
+    const CertificateTable& certificates;
+  };
+
+  std::size_t PlaneIndex(const Cell& size, int orientation) const {
+    const Cell c = size - Cell::Ones();
+    return static_cast<std::size_t>(((orientation * largest_.z() + c.z()) * largest_.y() + c.y()) * largest_.x() +
+                                    c.x());
+  }
+  Plane Shape(const Cell& size) const;
+  void FitIntoMemory(int orientations);
+  void FillFlags(const ContactMap& map);
+  void Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch);
+  /// The best bound of a set of hypotheses (`layers`, emptied) over the partitions of it.
+  std::uint64_t BestPartition(const Source& source, const std::vector<Bits256>& layers, const Cell& displacement,
+                              int orientation, Scratch& scratch) const;
+  /// Of the members of a box of the set, in table units.
+  std::uint64_t Certificates(const Source& source, const std::vector<Bits256>& layers, const HypothesisBox& box,
+                             const Cell& displacement, int orientation) const;
+
+  CellBox active_;  ///< displacements of one hypothesis beyond which the map repeats, and one cell more
+  std::array<bool, 3> mirrored_{};
+  /// Per axis: nothing is blocked beyond the active box, above and below. Who starts there has to come back.
+  std::array<bool, 3> free_above_{};
+  std::array<bool, 3> free_below_{};
+  Cell spread_;
+  Cell largest_;
+  double unit_ = 1.0;
+  std::uint32_t free_units_ = 1;
+  std::uint32_t contact_units_ = 0;
+  std::vector<std::vector<std::uint8_t>> flags_;  ///< per orientation and active displacement, see StepFlags
+  std::vector<Plane> planes_;
+};
+
+}  // namespace feeler::planner

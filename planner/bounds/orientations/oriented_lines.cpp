@@ -1,0 +1,178 @@
+#include "feeler/planner/bounds/orientations/oriented_lines.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "feeler/planner/bounds/certificates/equal_steps.h"
+
+namespace feeler::planner {
+namespace {
+
+constexpr std::uint32_t kInfinite = ~std::uint32_t{0};
+constexpr std::uint32_t kUnitsPerStep = 16;  ///< where contacts cost something
+
+}  // namespace
+
+OrientedLines::OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
+                             Parallelism jobs, const ProgressCallback& progress)
+    : units_per_step_(costs.contact > 0.0 ? kUnitsPerStep : 1) {
+  std::vector<char> used(static_cast<std::size_t>(flags.orientations()), 0);
+  for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
+  for (const Axis axis : {kYaw, kPitch}) AddLines(axis, problem, flags, used);
+  const double contact = costs.contact / costs.free * units_per_step_;
+  const auto contact_units = static_cast<std::uint32_t>(std::min(4000.0, std::floor(contact + 1e-9)));
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(jobs.threads()));
+  std::mutex mutex;
+  std::int64_t done = 0;
+  tbb::parallel_for(std::size_t{0}, lines_.size(), [&](std::size_t i) {
+    Fill(flags, contact_units, lines_[i]);
+    const std::lock_guard lock(mutex);
+    ++done;
+    if (progress) progress(done, static_cast<std::int64_t>(lines_.size()));
+  });
+}
+
+void OrientedLines::AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags,
+                             const std::vector<char>& used) {
+  const int pitches = problem.pitches;
+  const int yaws = flags.orientations() / pitches;
+  const int along = axis == kYaw ? yaws : pitches;
+  const int across = axis == kYaw ? pitches : yaws;
+  places_[axis].resize(used.size());
+  for (int i = 0; i < across; ++i) {
+    Line line;
+    const auto close = [&] {
+      if (line.orientations.size() > 1) {
+        for (std::size_t bit = 0; bit < line.orientations.size(); ++bit) {
+          places_[axis][static_cast<std::size_t>(line.orientations[bit])] = {static_cast<int>(lines_.size()),
+                                                                             static_cast<int>(bit)};
+        }
+        StepFlagsGrid::Region region = flags.region(line.orientations.front());
+        for (const int o : line.orientations) region = StepFlagsGrid::Union(region, flags.region(o));
+        line.box = OrientedBox(region, Cell::Zero());
+        lines_.push_back(std::move(line));
+      }
+      line = Line();
+    };
+    for (int k = 0; k < along; ++k) {
+      const int orientation = axis == kYaw ? k * pitches + i : i * pitches + k;
+      if (used[static_cast<std::size_t>(orientation)] != 0) line.orientations.push_back(orientation);
+      if (line.orientations.size() == kLongest) close();
+    }
+    close();
+  }
+}
+
+void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units, Line& line) const {
+  const OrientedBox& box = line.box;
+  const std::size_t cells = box.cells;
+  const auto strides = box.strides();
+  // Bit i: under hypothesis i of the line the cell is out of reach, or the step is blocked; and which steps stay
+  // inside.
+  std::vector<std::uint8_t> inside(cells, 0);
+  std::vector<std::array<std::uint8_t, kDirectionCount>> blocked(cells);
+  std::vector<std::uint8_t> leads(cells, 0);
+  std::vector<std::uint32_t> telling;  // cells where some step splits the line
+  std::uint32_t cell = 0;
+  for (int z = 0; z < box.size.z(); ++z) {
+    for (int y = 0; y < box.size.y(); ++y) {
+      for (int x = 0; x < box.size.x(); ++x, ++cell) {
+        const Cell at(x, y, z);
+        for (std::size_t i = 0; i < line.orientations.size(); ++i) {
+          const std::uint8_t steps = flags.At(box.domain.min + at, line.orientations[i]);
+          const auto bit = static_cast<std::uint8_t>(1U << i);
+          if (steps == kOutOfReach) inside[cell] |= bit;
+          for (const Direction d : kDirections) {
+            if (steps == kOutOfReach || (steps >> IndexOf(d) & 1) != 0) {
+              blocked[cell][static_cast<std::size_t>(IndexOf(d))] |= bit;
+            }
+          }
+        }
+        const auto all = static_cast<std::uint8_t>((1U << line.orientations.size()) - 1);
+        if (std::ranges::any_of(blocked[cell], [&](std::uint8_t b) { return b != 0 && b != all; })) {
+          telling.push_back(cell);
+        }
+        for (const Direction d : kDirections) {
+          const int to = at[AxisOf(d)] + SignOf(d);
+          if (to >= 0 && to < box.size[AxisOf(d)]) leads[cell] |= static_cast<std::uint8_t>(1U << IndexOf(d));
+        }
+      }
+    }
+  }
+  const auto step = [&](std::uint32_t from, Direction d) {
+    return static_cast<std::uint32_t>(from + SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
+  };
+
+  const std::uint32_t subsets = 1U << line.orientations.size();
+  line.values.assign(cells * subsets, 0);
+  const auto value = [&](std::uint32_t subset, std::uint32_t at) -> std::uint32_t {
+    if (std::has_single_bit(subset)) return 0;
+    const std::uint16_t v = line.values[subset * cells + at];
+    return v == kNone ? kInfinite : v;
+  };
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t s = 1; s < subsets; ++s) {
+    if (!std::has_single_bit(s)) order.push_back(s);
+  }
+  std::ranges::stable_sort(order, {}, [](std::uint32_t s) { return std::popcount(s); });
+  std::vector<std::uint32_t> cost(cells);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> seeds;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> queue;
+  for (const std::uint32_t subset : order) {
+    const auto count = static_cast<std::uint32_t>(std::popcount(subset));
+    std::ranges::fill(cost, kInfinite);
+    seeds.clear();
+    for (const std::uint32_t at : telling) {
+      if ((inside[at] & subset) != 0) continue;
+      for (const Direction d : kDirections) {
+        const std::uint32_t hit = blocked[at][static_cast<std::size_t>(IndexOf(d))] & subset;
+        if (hit == 0 || hit == subset) continue;
+        const std::uint32_t missed = subset & ~hit;
+        const std::uint32_t after_hit = value(hit, at);
+        // Over the edge everything repeats.
+        const std::uint32_t after_miss = value(missed, (leads[at] >> IndexOf(d) & 1) != 0 ? step(at, d) : at);
+        if (after_hit == kInfinite || after_miss == kInfinite) continue;
+        const std::uint32_t of_split = after_hit + after_miss +
+                                       static_cast<std::uint32_t>(std::popcount(hit)) * contact_units +
+                                       static_cast<std::uint32_t>(std::popcount(missed)) * units_per_step_;
+        if (of_split >= cost[at]) continue;
+        cost[at] = of_split;
+        seeds.emplace_back(of_split, at);
+      }
+    }
+    SpreadByEqualSteps(seeds, count * units_per_step_, cost, queue, [&](std::uint32_t to, auto relax) {
+      for (const Direction d : kDirections) {
+        if ((leads[to] >> IndexOf(Opposite(d)) & 1) == 0) continue;
+        const std::uint32_t before = step(to, Opposite(d));
+        if ((inside[before] | blocked[before][static_cast<std::size_t>(IndexOf(d))]) & subset) continue;
+        relax(before);
+      }
+    });
+    std::uint16_t* const plane = &line.values[subset * cells];
+    for (std::size_t i = 0; i < cells; ++i) {
+      plane[i] =
+          cost[i] == kInfinite ? kNone : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNone - 1U));
+    }
+  }
+}
+
+const std::uint16_t* OrientedLines::Plane(int line, unsigned subset) const {
+  if (std::has_single_bit(subset)) return nullptr;
+  const Line& of = lines_[static_cast<std::size_t>(line)];
+  return &of.values[subset * of.box.cells];
+}
+
+std::size_t OrientedLines::bytes() const {
+  std::size_t sum = 0;
+  for (const Line& line : lines_) sum += line.values.size() * sizeof(std::uint16_t);
+  return sum;
+}
+
+}  // namespace feeler::planner

@@ -1,0 +1,122 @@
+#include "feeler/planner/bounds/planning_tables.h"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "feeler/planner/bounds/certificates/certificate.h"
+#include "feeler/planner/bounds/cuboids/cuboid_heuristic.h"
+#include "feeler/planner/contact/fill_dead_ends.h"
+
+namespace feeler::planner {
+namespace {
+
+Cell SpreadOf(const Problem& problem) {
+  return problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
+}
+
+/// Extents of the box of the hypotheses.
+Cell ExtentsOf(const Problem& problem) {
+  Cell low = problem.hypotheses.front().offset;
+  Cell high = low;
+  for (const Hypothesis& h : problem.hypotheses) {
+    low = low.cwiseMin(h.offset);
+    high = high.cwiseMax(h.offset);
+  }
+  return high - low + Cell::Ones();
+}
+
+std::vector<int> OrientationsOf(const Problem& problem) {
+  std::vector<int> orientations;
+  for (const Hypothesis& h : problem.hypotheses) orientations.push_back(h.orientation);
+  std::ranges::sort(orientations);
+  orientations.erase(std::unique(orientations.begin(), orientations.end()), orientations.end());
+  return orientations;
+}
+
+}  // namespace
+
+PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs)
+    : map_(problem.map), problem_(problem), options_(options), masks_(*problem.map) {
+  options_.cancellation = nullptr;
+  options_.on_bounds = nullptr;
+  options_.on_tables = nullptr;
+  const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
+  const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths);
+  pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
+  const bool oriented = problem.map->orientations() > 1;
+  if (oriented) {
+    const auto flags = std::make_shared<const StepFlagsGrid>(*problem.map, jobs);
+    oriented_pairs_ = std::make_shared<OrientedPairs>(flags, costs);
+    if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
+      oriented_ = std::make_shared<OrientedCertificates>(problem, *flags, costs, jobs, options.on_tables);
+      oriented_lines_ = std::make_shared<OrientedLines>(problem, *flags, costs, jobs, options.on_tables);
+    }
+  }
+  switch (options.heuristic) {
+    case HeuristicKind::kCertificate:
+      if (oriented_) break;
+      if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
+        local_certificate_ = std::make_shared<LocalCertificateTable>(problem, motions);
+      } else {
+        certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
+      }
+      break;
+    case HeuristicKind::kCuboids:
+      if (oriented_) break;  // there are no tables of cuboids over orientations
+      certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
+      // Cuboids are bounded by single steps, in the middle of moves too: so must be what is left of them.
+      cuboids_ = std::make_shared<CuboidTable>(
+          *problem.map, masks_,
+          motions.start > 0.0 ? CertificateTable(*problem.map, costs, SpreadOf(problem)) : *certificate_, costs,
+          SpreadOf(problem), ExtentsOf(problem), jobs);
+      break;
+    case HeuristicKind::kLines:
+      lines_ = oriented ? std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem), ExtentsOf(problem),
+                                                      OrientationsOf(problem))
+                        : std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
+                                                      Cell::Constant(LineTable::kLongest), std::vector<int>{0});
+      break;
+    case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
+  }
+  if (options.solver == SolverKind::kCertified && problem.generous_workspace) filled();
+}
+
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
+                                                               const HypothesisSets& sets) const {
+  if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_, oriented_lines_);
+  if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
+  if (lines_ && oriented_pairs_) return std::make_unique<LineHeuristic>(problem, sets, lines_, oriented_pairs_);
+  if (lines_) return std::make_unique<LineHeuristic>(sets, lines_, pairs_);
+  if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
+  if (cuboids_) return std::make_unique<CuboidHeuristic>(sets, cuboids_, certificate_, pairs_);
+  return std::make_unique<CertificateHeuristic>(sets, certificate_, pairs_);
+}
+
+const PlanningTables::Filled& PlanningTables::filled() const {
+  std::call_once(filled_once_, [&] {
+    // Bounds for openings are made for one orientation.
+    if (map_->orientations() == 1) filled_.map = FillDeadEnds(*map_);
+    if (!filled_.map) return;
+    Problem problem = problem_;
+    problem.map = filled_.map;
+    // The open bound looks at walks that begin in the middle of a move, so these may have any length.
+    problem.move_lengths.resize(static_cast<std::size_t>(problem.move_lengths.back()));
+    std::iota(problem.move_lengths.begin(), problem.move_lengths.end(), 1);
+    SolverOptions options = options_;
+    options.heuristic = HeuristicKind::kCertificate;  // the bound is made of them
+    filled_.tables = std::make_shared<const PlanningTables>(problem, options, Parallelism());
+    if (!filled_.tables->certificate_) return;
+    filled_.bound =
+        std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
+                                          MotionCosts(problem_.cost, problem_.move_lengths), SpreadOf(problem_));
+  });
+  return filled_;
+}
+
+std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
+                                                          Parallelism jobs) {
+  return std::make_shared<PlanningTables>(problem, options, jobs);
+}
+
+}  // namespace feeler::planner

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "feeler/planner/belief/belief_heuristic.h"
+#include "feeler/planner/belief/contact_masks.h"
+#include "feeler/planner/bounds/build_tables.h"
+#include "feeler/planner/bounds/certificates/certificate_table.h"
+#include "feeler/planner/bounds/certificates/first_contact.h"
+#include "feeler/planner/bounds/certificates/local_certificate.h"
+#include "feeler/planner/bounds/certificates/pair_certificates.h"
+#include "feeler/planner/bounds/cuboids/cuboid_table.h"
+#include "feeler/planner/bounds/lines/lines.h"
+#include "feeler/planner/bounds/openings/open_bound.h"
+#include "feeler/planner/bounds/orientations/oriented_heuristic.h"
+
+namespace feeler::planner {
+
+class PlanningTables {
+ public:
+  PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs = {});
+
+  const ContactMasks& masks() const { return masks_; }
+  /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
+  std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets) const;
+
+  /// The map with its dead ends filled (see FillDeadEnds) and the tables for it; null if it has none. Made with the
+  /// tables of tasks for the certified solver, else when first asked for. Safe to call from many threads.
+  struct Filled {
+    std::shared_ptr<const ContactMap> map;
+    std::shared_ptr<const PlanningTables> tables;
+    std::shared_ptr<const OpenBound> bound;  ///< null without a table of certificates
+  };
+  const Filled& filled() const;
+
+ private:
+  std::shared_ptr<const ContactMap> map_;
+  Problem problem_;  ///< whose costs, goal and move lengths the tables are for
+  SolverOptions options_;
+  ContactMasks masks_;
+  std::shared_ptr<const CertificateTable> certificate_;
+  std::shared_ptr<const PairCertificates> pairs_;
+  std::shared_ptr<const OrientedCertificates> oriented_;  ///< with their pairs, where the target has orientations
+  std::shared_ptr<const OrientedPairs> oriented_pairs_;
+  std::shared_ptr<const OrientedLines> oriented_lines_;
+  std::shared_ptr<const CuboidTable> cuboids_;
+  std::shared_ptr<const LineTable> lines_;
+  std::shared_ptr<const FirstContactTable> first_contact_;
+  std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then
+  mutable std::once_flag filled_once_;
+  mutable Filled filled_;
+};
+
+}  // namespace feeler::planner

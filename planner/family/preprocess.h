@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "feeler/core/parallelism.h"
+#include "feeler/core/progress.h"
+#include "feeler/core/task.h"
+#include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/solve.h"
+
+namespace feeler::planner {
+
+/// Where finished policies go (the database). Calls are serial, from any of the working threads.
+class PolicySink {
+ public:
+  virtual ~PolicySink() = default;
+  /// True if this problem is done (an earlier run stored it): it is skipped.
+  virtual bool Done(const Extents& extents) = 0;
+  /// The stored policy of a problem that is done, as experience for others; empty if it has none.
+  virtual std::optional<PolicyGraph> Load(const Extents& extents) = 0;
+  /// A problem is finished, complete or not. The sequence of calls depends on the threads, their content does not.
+  virtual void Store(const Extents& extents, const Problem& problem, const SolverResult& result) = 0;
+};
+
+/// What a family is budgeted by.
+struct FamilyTraits {
+  bool openings = false;      ///< the opening of the target is open while localizing
+  bool orientations = false;  ///< the orientation of the target is uncertain
+};
+
+/// Problems of uncertain orientations up to this size are worth more expansions than larger ones.
+inline constexpr int kSmallOrientedHypotheses = 600;
+
+/// The options that a problem of so many hypotheses in a family is solved with: the certified solver without any limit
+/// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
+/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 60,000 above, where many stay open. 500
+/// where the map has openings: the first policy and the bound at the start are all there, and the search between them
+/// adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
+SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
+                               std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
+
+struct PreprocessOptions {
+  /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them for each problem.
+  SolverOptions solver;
+  bool openings = false;  ///< FamilyTraits::openings: the map does not tell
+  ProblemOrder order = ProblemOrder::kUncertainty;
+  ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
+  std::uint64_t seed = 1;                                ///< of the random order
+  Parallelism jobs;
+  /// Tables made by an earlier call of BuildPlanningTables for this task and these solver options; null to build them.
+  std::shared_ptr<const PlanningTables> tables;
+  const CancellationToken* cancellation = nullptr;  ///< problems in flight are dropped
+  ProgressCallback progress;                        ///< problems done, of all
+};
+
+struct PreprocessSummary {
+  std::int64_t problems = 0;
+  std::int64_t skipped = 0;   ///< done by an earlier run
+  std::int64_t complete = 0;  ///< solved in this run with a complete policy
+  std::int64_t failed = 0;    ///< no complete policy within the limits, or unlocalizable
+  bool cancelled = false;
+  double wall_s = 0.0;
+  double cpu_s = 0.0;  ///< summed over problems
+};
+
+/// Algorithm 3: solves the problems of a family in order, each with the most similar solved problem as experience, and
+/// hands every policy to the sink. Threads work along the real dependencies; the results are the same for any number of
+/// jobs and after a resume (what a time limit stopped is exempt).
+PreprocessSummary Preprocess(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
+                             const PreprocessOptions& options, PolicySink& sink);
+
+}  // namespace feeler::planner

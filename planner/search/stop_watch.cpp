@@ -1,0 +1,31 @@
+#include "feeler/planner/search/stop_watch.h"
+
+#include <cmath>
+
+namespace feeler::planner {
+
+StopWatch::StopWatch(const SolverOptions& options)
+    : options_(options), start_(std::chrono::steady_clock::now()), cpu_start_s_(ThreadCpuSeconds()) {}
+
+double StopWatch::wall_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
+  if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
+  if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
+  if ((++calls_ & 63) != 0) return std::nullopt;
+  if (wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
+  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= options_.cpu_limit_s) return SolverStatus::kTimeLimit;
+  return std::nullopt;
+}
+
+bool StopWatch::RowDue() {
+  if (!options_.on_bounds || (calls_ & 15) != 0) return false;
+  const double now_s = wall_s();
+  if (now_s < next_row_s_) return false;
+  next_row_s_ = now_s < 0.1 ? 0.1 : now_s * 1.25;
+  return true;
+}
+
+}  // namespace feeler::planner

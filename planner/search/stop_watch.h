@@ -1,0 +1,33 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+#include "feeler/core/clock.h"
+#include "feeler/planner/options/solver_options.h"
+#include "feeler/planner/options/solver_result.h"
+
+namespace feeler::planner {
+
+/// The stop condition of a solver, and its clocks.
+class StopWatch {
+ public:
+  explicit StopWatch(const SolverOptions& options);
+
+  double wall_s() const;
+  double cpu_s() const { return ThreadCpuSeconds() - cpu_start_s_; }
+  /// Why to stop now; empty to go on. Reads the clock only now and then.
+  std::optional<SolverStatus> Stop(std::int64_t expansions);
+  /// True when a row of the bounds table is due: at first, then at growing intervals of time.
+  bool RowDue();
+
+ private:
+  const SolverOptions& options_;
+  std::chrono::steady_clock::time_point start_;
+  double cpu_start_s_ = 0.0;
+  double next_row_s_ = 0.0;
+  int calls_ = 0;
+};
+
+}  // namespace feeler::planner

@@ -1,0 +1,177 @@
+// Laws of the noises of the world: names combine with commas and contradictions are refused; `outside` puts the truth
+// 0.5 to 4 mm outside the box on exactly one axis; yaw errors have the size of their name and either sign; each noise
+// makes a deterministic episode in physics that the executor with its ladder masters, and `fall-in` makes the tool
+// fall in; a start pose out of reach ends the episode with a reason.
+#include "feeler/workflow/episode/episode_faults.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "feeler/core/error.h"
+#include "feeler/env/scene/oversize_target.h"
+#include "feeler/execution/recovery/online_planner.h"
+#include "feeler/workflow/episode/episode.h"
+#include "feeler/workflow/episode/episode_draw.h"
+
+namespace feeler::workflow {
+namespace {
+
+TEST(ParseFaults, CombinesNamesAndRefusesContradictions) {
+  EXPECT_EQ(ParseFaults("ideal").yaw_error_rad, 0.0);
+  const EpisodeFaults both = ParseFaults("friction,yaw-2");
+  EXPECT_GT(both.robot.force_noise_n, 0.0);
+  EXPECT_NEAR(both.yaw_error_rad, 2.0 * std::numbers::pi / 180.0, 1e-12);
+  EXPECT_EQ(both.name, "friction,yaw-2");
+  for (const FaultName& noise : FaultNames()) {
+    std::string name = noise.name;
+    if (const std::size_t number = name.find("NUMBER"); number != std::string::npos) {
+      EXPECT_THROW(ParseFaults(name), InputError) << name;
+      name.replace(number, std::string::npos, name.starts_with("stiffness") ? "20000" : "3");
+    }
+    EXPECT_NO_THROW(ParseFaults(name)) << name;
+  }
+  for (const char* bad : {"", "loud", "yaw-1,yaw-2", "outside,fall-in", "friction,friction", "ideal,"}) {
+    EXPECT_THROW(ParseFaults(bad), InputError) << bad;
+  }
+}
+
+Task ThreeAxisTask() {
+  Task task;
+  task.axes = {{AxisKind::kX}, {AxisKind::kY}, {AxisKind::kZ}};
+  task.world_T_target = MakePose({0.6, 0.1, 0.2}, 0.3);
+  return task;
+}
+
+TEST(DrawEpisode, OutsideIsBeyondOneSideOfTheBox) {
+  const Task task = ThreeAxisTask();
+  const planner::ProblemFamily family = planner::ParseProblemFamily("3x4x7");
+  const Eigen::Vector3d half_m = 0.5 * task.cell_m * Eigen::Vector3d(3, 4, 7);
+  int sides[3][2] = {};
+  for (std::uint64_t k = 0; k < 300; ++k) {
+    const EpisodeDraw draw = DrawEpisode(task, family, 3, k, ParseFaults("outside"));
+    const Eigen::Vector3d offset = (draw.world_T_estimate.inverse() * draw.world_T_true).translation();
+    int outside = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double beyond = std::abs(offset[axis]) - half_m[axis];
+      if (beyond <= 0.0) continue;
+      ++outside;
+      ++sides[axis][offset[axis] > 0.0];
+      EXPECT_GE(beyond, 0.0005 - 1e-12);
+      EXPECT_LE(beyond, 0.004 + 1e-12);
+    }
+    EXPECT_EQ(outside, 1);
+  }
+  for (const auto& axis : sides) {
+    EXPECT_GT(axis[0], 20);
+    EXPECT_GT(axis[1], 20);
+  }
+}
+
+TEST(DrawEpisode, YawErrorHasItsSizeAndEitherSign) {
+  const Task task = ThreeAxisTask();
+  const planner::ProblemFamily family = planner::ParseProblemFamily("3x3x3");
+  const EpisodeFaults noise = ParseFaults("yaw-3");
+  int positive = 0;
+  for (std::uint64_t k = 0; k < 200; ++k) {
+    const EpisodeDraw draw = DrawEpisode(task, family, 3, k, noise);
+    const Eigen::Matrix3d turn = draw.world_T_estimate.linear().transpose() * draw.world_T_true.linear();
+    const double yaw = std::atan2(turn(1, 0), turn(0, 0));
+    EXPECT_NEAR(std::abs(yaw), noise.yaw_error_rad, 1e-12);
+    positive += yaw > 0.0;
+    // The same place as without.
+    const EpisodeDraw plain = DrawEpisode(task, family, 3, k);
+    EXPECT_EQ(draw.world_T_true.translation(), plain.world_T_true.translation());
+  }
+  EXPECT_GT(positive, 60);
+  EXPECT_LT(positive, 140);
+}
+
+std::shared_ptr<const PlanningSetup> PlugSetup() {
+  static const auto kSetup = std::make_shared<const PlanningSetup>(LoadPlanningSetup("plug"));
+  return kSetup;
+}
+
+EpisodeRunner Runner(std::shared_ptr<const PlanningSetup> setup, const std::string& noise) {
+  static const auto kPlanner = std::make_shared<execution::OnlinePlanner>();
+  const auto factory = [](const PolicyRequest& request) { return kPlanner->PolicyFor(request.problem); };
+  EpisodeOptions options;
+  options.seed = 17;
+  options.family = planner::ParseProblemFamily("3x3x3");
+  options.noise = noise;
+  return EpisodeRunner(setup, BuildEpisodeScene(*setup), factory, options);
+}
+
+class NoisyEpisode : public testing::TestWithParam<const char*> {};
+
+TEST_P(NoisyEpisode, IsMasteredAndDeterministic) {
+  const EpisodeRecord first = Runner(PlugSetup(), GetParam()).Run(2);
+  EXPECT_TRUE(first.inserted) << first.reason;
+  EXPECT_EQ(first.noise, GetParam());
+  EpisodeRunner again = Runner(PlugSetup(), GetParam());
+  again.Run(1);  // what ran before does not matter
+  const EpisodeRecord second = again.Run(2);
+  EXPECT_EQ(first.reason, second.reason);
+  EXPECT_EQ(first.execution.sim_time_s, second.execution.sim_time_s);
+  EXPECT_EQ(first.execution.path_length_m, second.execution.path_length_m);
+  EXPECT_EQ(first.execution.ladder.size(), second.execution.ladder.size());
+  if (std::string(GetParam()) == "fall-in") {
+    EXPECT_TRUE(first.execution.fell_in);
+  }
+  if (std::string(GetParam()) == "yaw-3") {
+    EXPECT_LT(first.error->angle_rad, 0.0175);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Names, NoisyEpisode,
+                         testing::Values("ideal", "friction", "outside", "fall-in", "oversize", "yaw-2", "yaw-3"),
+                         [](const auto& name) {
+                           std::string text = name.param;
+                           for (char& c : text) c = c == '-' ? '_' : c;
+                           return text;
+                         });
+
+TEST(ParseFaults, NumbersGrowOnTopOfPresets) {
+  const EpisodeFaults noise = ParseFaults("force-noise=2,joint-friction=5,stiffness=20000,yaw=1.5");
+  EXPECT_EQ(noise.robot.force_noise_n, 2.0);
+  EXPECT_GE(noise.robot.contact_threshold_n, 12.0) << "contacts are told from noise";
+  EXPECT_EQ(noise.robot.joint_friction_nm[0], 5.0);
+  EXPECT_EQ(noise.robot.joint_friction_nm[5], 2.0);
+  EXPECT_EQ(noise.robot.joint_stiffness_nm_rad, 20000.0);
+  EXPECT_NEAR(noise.yaw_error_rad, 0.0261799, 1e-6);
+  const EpisodeFaults none = ParseFaults("force-noise=0,joint-friction=0");
+  EXPECT_EQ(none.robot.contact_threshold_n, ParseFaults("ideal").robot.contact_threshold_n);
+  EXPECT_EQ(ParseFaults("force-noise=0.5,friction").robot.force_noise_n, 0.5) << "in any order";
+  for (const char* bad : {"force-noise=", "force-noise=-1", "force-noise=x", "yaw=nan", "loudness=3", "yaw=1,yaw-2",
+                          "yaw=1,yaw=1", "stiffness=0"}) {
+    EXPECT_THROW(ParseFaults(bad), InputError) << bad;
+  }
+}
+
+TEST(OversizeTarget, StandsFartherOutOnTheSidesOnly) {
+  const auto scene = BuildEpisodeScene(*PlugSetup());
+  const env::Scene grown = env::WithOversizeTarget(*scene, 0.0005);
+  const auto reach = [](const env::Scene& s, const char* name, int axis) {
+    const int geom = mj_name2id(s.model.get(), mjOBJ_GEOM, name);
+    return s.model->geom_pos[3 * geom + axis] + s.model->geom_size[3 * geom + axis];
+  };
+  EXPECT_NEAR(reach(grown, "c14_wall_north", 1), reach(*scene, "c14_wall_north", 1) + 0.0005, 1e-12);
+  EXPECT_NEAR(reach(grown, "c14_wall_east", 0), reach(*scene, "c14_wall_east", 0) + 0.0005, 1e-12);
+  EXPECT_NEAR(reach(grown, "c14_wall_north", 2), reach(*scene, "c14_wall_north", 2), 1e-12);
+  // The side towards the opening stays.
+  EXPECT_NEAR(reach(grown, "c14_wall_south", 1), reach(*scene, "c14_wall_south", 1), 1e-12);
+  EXPECT_THROW(env::WithOversizeTarget(*scene, -1.0), InputError);
+}
+
+TEST(Episode, StartOutOfReachEndsItWithAReason) {
+  PlanningSetup far = *PlugSetup();
+  far.model.task.world_T_target.translation() += Eigen::Vector3d(2.0, 0.0, 0.0);
+  const EpisodeRecord record = Runner(std::make_shared<const PlanningSetup>(far), "ideal").Run(0);
+  EXPECT_FALSE(record.inserted);
+  EXPECT_NE(record.reason.find("transfer to the start pose"), std::string::npos) << record.reason;
+}
+
+}  // namespace
+}  // namespace feeler::workflow

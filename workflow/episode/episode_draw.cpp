@@ -1,0 +1,69 @@
+#include "feeler/workflow/episode/episode_draw.h"
+
+#include <Eigen/Geometry>
+
+#include "feeler/core/error.h"
+#include "feeler/core/random.h"
+#include "feeler/env/gym/insertion_env.h"
+
+namespace feeler::workflow {
+namespace {
+
+/// How far outside the box of possible positions the noise `outside` puts the target.
+constexpr double kNearestOutside_m = 0.0005;
+constexpr double kFarthestOutside_m = 0.004;
+
+/// Moves the truth beyond one side of the box, chosen among those of the uncertain positions.
+void MoveOutside(const Task& task, const planner::Extents& cuboid, RandomStream& random, EpisodeDraw& draw) {
+  std::vector<const UncertainAxis*> axes;
+  for (const UncertainAxis& axis : task.axes) {
+    if (!axis.angular()) axes.push_back(&axis);
+  }
+  if (axes.empty()) throw InputError("noise outside", "the task has no uncertain position");
+  const UncertainAxis& axis = *axes[random.Index(axes.size())];
+  const int i = static_cast<int>(axis.kind);
+  const double side = random.Index(2) == 0 ? -1.0 : 1.0;
+  const double beyond = random.Uniform(kNearestOutside_m, kFarthestOutside_m);
+  Eigen::Vector3d offset = (draw.world_T_estimate.inverse() * draw.world_T_true).translation();
+  offset[i] = side * (0.5 * cuboid[i] * axis.resolution + beyond);
+  draw.world_T_true.translation() = draw.world_T_estimate * offset;
+}
+
+}  // namespace
+
+std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid) {
+  return planner::ExtentsPerAxis(planner::AxesOf(task), cuboid);
+}
+
+planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t seed, std::uint64_t episode) {
+  if (family.problems.empty()) throw InputError("episodes", "no problem to draw from", "give --extents or a database");
+  RandomStream problem(seed, episode, "problem");
+  return family.problems[problem.Index(family.problems.size())];
+}
+
+EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
+                        std::uint64_t episode, const EpisodeFaults& noise) {
+  EpisodeDraw draw;
+  draw.extents = DrawProblem(family, seed, episode);
+  draw.world_T_estimate = task.world_T_target;
+
+  RandomStream truth(seed, episode, "true pose");
+  draw.world_T_true = env::DrawTruePose(task, draw.world_T_estimate, AxisExtents(task, draw.extents), truth);
+  if (noise.outside) {
+    RandomStream outside(seed, episode, "truth outside");
+    MoveOutside(task, draw.extents, outside, draw);
+  }
+  draw.world_T_true = TurnedByFault(task, noise, seed, episode, draw.world_T_true);
+  return draw;
+}
+
+Pose TurnedByFault(const Task& task, const EpisodeFaults& noise, std::uint64_t seed, std::uint64_t episode,
+                   const Pose& world_T_target) {
+  if (noise.yaw_error_rad == 0.0) return world_T_target;
+  const double side = RandomStream(seed, episode, "yaw error").Index(2) == 0 ? -1.0 : 1.0;
+  Pose turned = world_T_target;
+  turned.linear() = turned.linear() * Eigen::AngleAxisd(side * noise.yaw_error_rad, -UnitVector(task.insertion));
+  return turned;
+}
+
+}  // namespace feeler::workflow

@@ -1,0 +1,167 @@
+#include "feeler/workflow/episode/episode_faults.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <numbers>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "feeler/core/error.h"
+
+namespace feeler::workflow {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// What a name adds to the world; the arm's presets stand in env.
+struct WorldNoise {
+  const char* name;
+  const char* meaning;
+  void (*add)(EpisodeFaults& noise);
+};
+
+void AddYaw(EpisodeFaults& noise, double degrees) {
+  if (noise.yaw_error_rad > 0.0) throw InputError("noise", "two yaw errors", "give one of them");
+  noise.yaw_error_rad = degrees * kDegree;
+}
+
+constexpr WorldNoise kWorldNoises[] = {
+    {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
+     [](EpisodeFaults& n) { n.outside = true; }},
+    {"fall-in", "the target stands where a probe of the policy falls into the opening",
+     [](EpisodeFaults& n) { n.fall_in = true; }},
+    {"oversize", "the sides of the target stand 0.5 mm farther out than in the model",
+     [](EpisodeFaults& n) { n.oversize_m = 0.0005; }},
+    {"yaw-1", "the target is turned by 1 degree, either way", [](EpisodeFaults& n) { AddYaw(n, 1.0); }},
+    {"yaw-2", "the target is turned by 2 degrees", [](EpisodeFaults& n) { AddYaw(n, 2.0); }},
+    {"yaw-3", "the target is turned by 3 degrees", [](EpisodeFaults& n) { AddYaw(n, 3.0); }},
+};
+
+/// Names with a number, "force-noise=2".
+struct MeasuredNoise {
+  const char* name;
+  const char* meaning;
+  double least;
+  double most;
+  void (*add)(EpisodeFaults& noise, double value);
+};
+
+constexpr MeasuredNoise kMeasuredNoises[] = {
+    {"force-noise", "noise of the force sensor, N; contacts are told from 4 N + 6 times that on", 0.0, 50.0,
+     [](EpisodeFaults& n, double newton) {
+       n.robot.force_noise_n = newton;
+       n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 4.0 + 6.0 * newton);
+     }},
+    {"joint-friction", "friction of the large joints, Nm; the wrists have two fifths of it", 0.0, 30.0,
+     [](EpisodeFaults& n, double torque_nm) {
+       for (int i = 0; i < env::kJointCount; ++i) n.robot.joint_friction_nm[i] = (i < 3 ? 1.0 : 0.4) * torque_nm;
+       // Friction that the observer has not caught up with reads as force at the tool.
+       if (torque_nm > 0.0) n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 10.0);
+     }},
+    {"stiffness", "stiffness of each joint between encoder and link, Nm/rad (a UR10e has some 50000)", 1e4, 1e9,
+     [](EpisodeFaults& n, double stiffness) { n.robot.joint_stiffness_nm_rad = stiffness; }},
+    {"yaw", "the target is turned by so many degrees, either way", 0.0, 30.0,
+     [](EpisodeFaults& n, double degrees) { AddYaw(n, degrees); }},
+};
+
+/// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.
+bool AddMeasured(const std::string& text, EpisodeFaults& noise) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) return false;
+  const std::string name = text.substr(0, equals);
+  for (const MeasuredNoise& measured : kMeasuredNoises) {
+    if (name != measured.name) continue;
+    std::istringstream number(text.substr(equals + 1));
+    double value = 0.0;
+    if (!(number >> value) || !number.eof() || !(value >= measured.least && value <= measured.most)) {
+      throw InputError("noise", "'" + text + "' has no sensible number",
+                       fmt::format("give {}=NUMBER of {} to {}", name, measured.least, measured.most));
+    }
+    measured.add(noise, value);
+    return true;
+  }
+  return false;
+}
+
+const char* MeaningOfArmNoise(const std::string& name) {
+  if (name == "ideal") return "nothing";
+  if (name == "friction") return "3 Nm of friction in the large joints, 1.2 Nm in the wrists, force noise of 1 N";
+  return "arm and force sensor";
+}
+
+std::vector<std::string> Split(std::string_view text) {
+  std::vector<std::string> names;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', from), text.size());
+    names.emplace_back(text.substr(from, comma - from));
+    from = comma + 1;
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<FaultName> FaultNames() {
+  std::vector<FaultName> names;
+  for (const std::string& name : env::NoisePresetNames()) names.push_back({name, MeaningOfArmNoise(name)});
+  for (const WorldNoise& world : kWorldNoises) names.push_back({world.name, world.meaning});
+  for (const MeasuredNoise& measured : kMeasuredNoises) {
+    names.push_back({std::string(measured.name) + "=NUMBER", measured.meaning});
+  }
+  return names;
+}
+
+namespace {
+
+InputError UnknownNoise(const std::string& name) {
+  std::string known;
+  for (const FaultName& n : FaultNames()) known += (known.empty() ? "" : ", ") + n.name;
+  return {"noise", "no noise is named '" + name + "'", "one of, or several with commas: " + known};
+}
+
+}  // namespace
+
+EpisodeFaults ParseFaults(std::string_view text) {
+  EpisodeFaults noise;
+  noise.robot = env::NoisePreset("ideal");
+  bool arm_given = false;
+  std::vector<std::string> measured;  // these change what presets set
+  std::vector<std::string> seen;
+  for (const std::string& name : Split(text)) {
+    if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
+      throw InputError("noise", "'" + name + "' stands twice", "give it once");
+    }
+    seen.push_back(name);
+    const auto* world = std::find_if(std::begin(kWorldNoises), std::end(kWorldNoises),
+                                     [&](const WorldNoise& candidate) { return name == candidate.name; });
+    if (world != std::end(kWorldNoises)) {
+      world->add(noise);
+      continue;
+    }
+    if (name.find('=') != std::string::npos) {
+      measured.push_back(name);
+      continue;
+    }
+    const std::vector<std::string> arm = env::NoisePresetNames();
+    if (std::find(arm.begin(), arm.end(), name) == arm.end()) {
+      throw UnknownNoise(name);
+    }
+    if (name == "ideal") continue;
+    if (arm_given) throw InputError("noise", "two noises of the arm", "give one of them");
+    arm_given = true;
+    noise.robot = env::NoisePreset(name);
+  }
+  for (const std::string& name : measured) {
+    if (!AddMeasured(name, noise)) throw UnknownNoise(name);
+  }
+  if (noise.outside && noise.fall_in) {
+    throw InputError("noise", "'outside' and 'fall-in' both say where the target stands", "give one of them");
+  }
+  noise.name = text;
+  return noise;
+}
+
+}  // namespace feeler::workflow

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "feeler/env/robot/noise.h"
+
+namespace feeler::workflow {
+
+/// What makes the world of an episode harder than the planner thinks it is.
+struct EpisodeFaults {
+  std::string name = "ideal";  ///< as records give it
+  env::NoiseOptions robot;     ///< arm and force sensor
+  /// The truth lies outside the hypotheses: 0.5 to 4 mm beyond the box of possible positions on one axis.
+  bool outside = false;
+  /// The truth lies so that a probe of the policy comes down into the opening.
+  bool fall_in = false;
+  double oversize_m = 0.0;     ///< the sides of the target stand this much farther out in physics than in the model
+  double yaw_error_rad = 0.0;  ///< the target is turned by this about the insertion axis, the sign drawn
+};
+
+struct FaultName {
+  std::string name;
+  std::string meaning;
+};
+/// Every name that ParseFaults takes, with a line about each.
+std::vector<FaultName> FaultNames();
+
+/// One name or several with commas between ("friction,yaw-2", "force-noise=2,yaw=1.5"): at most one of the arm, the
+/// rest add up. Throws InputError for an unknown name, listing the known ones, and for names that contradict each
+/// other.
+EpisodeFaults ParseFaults(std::string_view text);
+
+}  // namespace feeler::workflow

@@ -1,0 +1,139 @@
+#include "feeler/workflow/setup/database_builder.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "feeler/core/error.h"
+#include "feeler/core/orientation_lattice.h"
+#include "feeler/policies/storage/database_sink.h"
+#include "feeler/policies/storage/verify.h"
+
+namespace feeler::workflow {
+namespace {
+
+planner::FamilyTraits TraitsOf(const PlanningSetup& setup) {
+  return {.openings = setup.opening == env::Opening::kOpen, .orientations = LatticeOrientations(setup.task()) > 1};
+}
+
+/// Null where there is no limit: JSON has no infinity.
+nlohmann::json Limit(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+
+}  // namespace
+
+policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner::PreprocessOptions& options) {
+  const planner::SolverOptions solver = planner::WithFamilyBudget(options.solver, TraitsOf(setup));
+  nlohmann::json settings = {
+      {"solver", planner::ToString(solver.solver)},
+      {"heuristic", planner::ToString(solver.heuristic)},
+      {"canonical_translation", solver.canonical_translation},
+      {"time_limit_s", Limit(solver.time_limit_s)},
+      {"expansion_limit", solver.expansion_limit},
+      {"seed", solver.seed},
+  };
+  const std::int64_t small_limit =
+      planner::WithFamilyBudget(options.solver, TraitsOf(setup), planner::kSmallOrientedHypotheses).expansion_limit;
+  if (small_limit != solver.expansion_limit) {
+    settings["expansion_limit_small"] = {{"hypotheses", planner::kSmallOrientedHypotheses},
+                                         {"expansions", small_limit}};
+  }
+  if (solver.solver == planner::SolverKind::kCertified) {
+    settings["gap"] = solver.gap;
+  } else {
+    settings["epsilon"] = solver.epsilon;
+  }
+  if (solver.solver == planner::SolverKind::kERtdpBel) {
+    settings["experience"] = planner::ToString(options.experience);
+    settings["order"] = options.order == planner::ProblemOrder::kUncertainty ? "uncertainty" : "random";
+    settings["order_seed"] = options.seed;
+  }
+  if (setup.cost_kind == CostKind::kTime) settings["cost"] = ToString(setup.cost_kind);
+  policies::DatabaseIdentity identity;
+  identity.task = setup.task().name;
+  identity.axes = planner::AxesOf(setup.task());
+  identity.fingerprint = setup.fingerprint;
+  identity.opening = env::ToString(setup.opening);
+  identity.goal = ToString(setup.task().goal);
+  identity.cost = setup.task().cost;
+  identity.settings = settings.dump();
+  identity.created_by = FEELER_VERSION;
+  return identity;
+}
+
+void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
+  std::array<int, planner::kAxisKinds> largest = {1, 1, 1, 1, 1};
+  for (const UncertainAxis& axis : task.axes) largest[static_cast<std::size_t>(axis.kind)] = axis.max_cells;
+  for (const planner::Extents& extents : family.problems) {
+    for (int axis = 0; axis < planner::kAxisKinds; ++axis) {
+      const int most = largest[static_cast<std::size_t>(axis)];
+      if (extents[axis] >= 1 && extents[axis] <= most) continue;
+      throw InputError("problem " + planner::ToString(extents, task),
+                       fmt::format("task {} allows 1..{} {} along {}", task.name, most, axis < 3 ? "cells" : "angles",
+                                   ToString(static_cast<AxisKind>(axis))),
+                       "change the family, or the ranges in the task file");
+    }
+  }
+}
+
+DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
+                            const planner::PreprocessOptions& options, const std::string& path) {
+  policies::Database database = policies::Database::OpenOrCreate(path, IdentityOf(setup, options));
+  planner::PreprocessOptions of_setup = options;
+  of_setup.openings = setup.opening == env::Opening::kOpen;
+  policies::DatabaseSink sink(database, options.solver);
+  DatabaseBuild build;
+  build.summary = planner::Preprocess(setup.task(), setup.map, family, of_setup, sink);
+  build.info = database.Info();
+  return build;
+}
+
+DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Database& database, Parallelism jobs,
+                                    const ProgressCallback& progress, const CancellationToken* cancellation) {
+  database.RequireFingerprint(setup.task().name, setup.fingerprint);
+  database.Verify();
+
+  const std::vector<policies::StoredProblem> problems = database.List();
+  DatabaseVerification result;
+  result.problems = static_cast<std::int64_t>(problems.size());
+  std::vector<std::string> faults(problems.size());
+  std::mutex mutex;
+  std::int64_t done = 0;
+
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(jobs.threads()));
+  tbb::parallel_for(std::size_t{0}, problems.size(), [&](std::size_t i) {
+    if (cancellation != nullptr && cancellation->cancelled()) return;
+    const auto stored = database.Get(problems[i].extents);
+    double error = 0.0;
+    int hypotheses = 0;
+    if (stored && stored->policy) {
+      const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored->extents);
+      const policies::RowVerification row = policies::VerifyRow(*stored, problem);
+      error = std::abs(row.replayed_cost - stored->expected_cost);
+      hypotheses = static_cast<int>(problem.hypotheses.size());
+      if (!row.valid()) faults[i] = planner::ToString(stored->extents, setup.task()) + ": " + row.fault;
+    }
+    const std::lock_guard lock(mutex);
+    if (hypotheses > 0) ++result.policies;
+    result.hypotheses += hypotheses;
+    result.largest_cost_error = std::max(result.largest_cost_error, error);
+    ++done;
+    if (progress) progress(done, result.problems);
+  });
+  for (const std::string& fault : faults) {
+    if (fault.empty()) continue;
+    if (result.first_fault.empty()) result.first_fault = fault;
+    ++result.faults;
+  }
+  return result;
+}
+
+}  // namespace feeler::workflow

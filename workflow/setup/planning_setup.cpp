@@ -1,0 +1,51 @@
+#include "feeler/workflow/setup/planning_setup.h"
+
+#include <nlohmann/json.hpp>
+
+#include "feeler/env/contact/contact_map_cache.h"
+#include "feeler/env/model/fingerprint.h"
+
+namespace feeler::workflow {
+namespace {
+
+/// Settings name the kind of cost only where it is not distance.
+CostKind KindOf(const policies::DatabaseIdentity& identity) {
+  const auto settings = nlohmann::json::parse(identity.settings, nullptr, false);
+  const bool time = settings.is_object() && settings.value("cost", "") == ToString(CostKind::kTime);
+  return time ? CostKind::kTime : CostKind::kDistance;
+}
+
+}  // namespace
+
+std::string CostUnit(CostKind kind, const CostWeights& cost) {
+  if (kind == CostKind::kTime) return "s";
+  return cost == CostWeights{} ? "cells" : "weighted";
+}
+
+std::string CostUnit(const policies::DatabaseIdentity& identity) { return CostUnit(KindOf(identity), identity.cost); }
+
+PlanningSetupOptions SetupOptionsOf(const policies::DatabaseIdentity& identity) {
+  PlanningSetupOptions options;
+  options.opening =
+      identity.opening == env::ToString(env::Opening::kOpen) ? env::Opening::kOpen : env::Opening::kClosed;
+  options.goal = identity.goal == ToString(GoalKind::kInsertable) ? GoalKind::kInsertable : GoalKind::kSingleton;
+  options.cost_kind = KindOf(identity);
+  options.cost = identity.cost;
+  return options;
+}
+
+PlanningSetup LoadPlanningSetup(const std::string& task, const PlanningSetupOptions& options) {
+  PlanningSetup setup;
+  setup.model = env::LoadTask(task);
+  if (options.goal) setup.model.task.goal = *options.goal;
+  if (options.cost_kind == CostKind::kTime) setup.model.task.cost = TimeCost(setup.task());
+  if (options.cost) setup.model.task.cost = *options.cost;
+  setup.cost_kind = options.cost_kind;
+  setup.opening = options.opening;
+  setup.map = std::make_shared<const planner::ContactMap>(
+      env::GetContactMap(setup.model, options.opening, options.jobs, options.progress));
+  setup.fingerprint = env::Fingerprint(setup.model, options.opening);
+  return setup;
+}
+
+}  // namespace feeler::workflow

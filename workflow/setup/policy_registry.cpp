@@ -1,0 +1,259 @@
+#include "feeler/workflow/setup/policy_registry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <mutex>
+#include <sstream>
+#include <utility>
+
+#include "feeler/core/error.h"
+#include "feeler/env/contact/mesh_outcomes.h"
+#include "feeler/policies/database_policy.h"
+#include "feeler/policies/open_loop.h"
+#include "feeler/policies/spiral/hybrid_policy.h"
+#include "feeler/policies/touch/touch_based_localization.h"
+#include "feeler/policies/visual/visual_servoing.h"
+#include "feeler/workflow/setup/visual_goal.h"
+
+namespace feeler::workflow {
+namespace {
+
+using PolicyPointer = std::unique_ptr<policies::Policy>;
+
+/// The active region of a contact map, found once.
+class RegionCache {
+ public:
+  std::shared_ptr<const planner::ActiveRegion> RegionOf(const std::shared_ptr<const planner::ContactMap>& map) {
+    const std::lock_guard lock(mutex_);
+    if (map_ != map) {
+      region_ = std::make_shared<const planner::ActiveRegion>(*map);
+      map_ = map;
+    }
+    return region_;
+  }
+
+ private:
+  std::mutex mutex_;  // guards both below
+  std::shared_ptr<const planner::ContactMap> map_;
+  std::shared_ptr<const planner::ActiveRegion> region_;
+};
+
+/// What the policies of a factory share.
+struct Shared {
+  std::shared_ptr<policies::Database> database;
+  PolicyOptions options;
+  std::shared_ptr<planner::PlanningTablesCache> tables = std::make_shared<planner::PlanningTablesCache>();
+  std::shared_ptr<VisualGoalOnce> visual_goal = std::make_shared<VisualGoalOnce>();
+  std::shared_ptr<RegionCache> regions = std::make_shared<RegionCache>();
+};
+
+/// A policy by its name. A new one: a function, and a line in kPolicies.
+struct Entry {
+  const char* name;
+  bool needs_database;
+  bool uses_ladder;
+  PolicyPointer (*make)(const PolicyRequest& request, const Shared& shared);
+};
+
+/// Expansions a step for a problem that the database does not hold: a budget that gives the same policy everywhere.
+constexpr std::int64_t kOutsideExpansions = 3000;
+
+PolicyPointer MakeDatabase(const PolicyRequest& request, const Shared& shared) {
+  const auto stored = shared.database->Get(request.extents);
+  if (stored && stored->policy) {
+    return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::PolicyGraph>(*stored->policy));
+  }
+  policies::OnlineOptions online = shared.options.online;
+  if (!online.expansion_limit) online.expansion_limit = kOutsideExpansions;
+  return std::make_unique<policies::OnlinePolicy>(online, shared.tables);
+}
+
+PolicyPointer MakeOnline(const PolicyRequest& /*request*/, const Shared& shared) {
+  return std::make_unique<policies::OnlinePolicy>(shared.options.online, shared.tables);
+}
+
+PolicyPointer MakeOpenLoop(const PolicyRequest& /*request*/, const Shared& /*shared*/) {
+  return std::make_unique<policies::OpenLoopPolicy>();
+}
+
+PolicyPointer MakeSpiral(const PolicyRequest& request, const Shared& shared) {
+  const Task& task = request.setup.task();
+  return std::make_unique<policies::SpiralPolicy>(task.insertion, task.cell_m,
+                                                  shared.options.spiral.value_or(TunedSpiral(task)));
+}
+
+PolicyPointer MakeHybrid(const PolicyRequest& request, const Shared& shared) {
+  const Task& task = request.setup.task();
+  const double threshold_m =
+      shared.options.hybrid_threshold_m > 0.0 ? shared.options.hybrid_threshold_m : MeasuredHybridThreshold(task);
+  return std::make_unique<policies::HybridPolicy>(MakeSpiral(request, shared), MakeDatabase(request, shared),
+                                                  task.insertion, task.cell_m, threshold_m);
+}
+
+PolicyPointer MakeTouch(const PolicyRequest& request, const Shared& shared, const char* name,
+                        policies::TouchCriterion criterion, std::unique_ptr<planner::OutcomeModel> outcomes = nullptr) {
+  policies::TouchOptions options;
+  options.criterion = criterion;
+  options.actions = shared.options.tbl_actions;
+  options.name = name;
+  options.region = shared.regions->RegionOf(request.setup.map);
+  return std::make_unique<policies::TouchBasedLocalization>(std::move(options), std::move(outcomes), request.seed,
+                                                            request.episode);
+}
+
+PolicyPointer MakeTbl(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl", policies::TouchCriterion::kInformationGain);
+}
+
+PolicyPointer MakeTblMesh(const PolicyRequest& request, const Shared& shared) {
+  const PlanningSetup& setup = request.setup;
+  return MakeTouch(request, shared, "tbl-mesh", policies::TouchCriterion::kInformationGain,
+                   std::make_unique<env::MeshOutcomes>(setup.model, setup.opening, setup.map->phase()));
+}
+
+PolicyPointer MakeTblPerCost(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl-per-cost", policies::TouchCriterion::kInformationGainPerCost);
+}
+
+PolicyPointer MakeTblSubmodular(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "tbl-submodular", policies::TouchCriterion::kPruningPerCost);
+}
+
+PolicyPointer MakeRandom(const PolicyRequest& request, const Shared& shared) {
+  return MakeTouch(request, shared, "random", policies::TouchCriterion::kAny);
+}
+
+PolicyPointer MakeVisualServoing(const char* name, std::shared_ptr<const policies::VisualGoal> goal, bool tape) {
+  std::unique_ptr<policies::FeatureTracker> tracker =
+      tape ? policies::MakeTapeTracker(goal) : policies::MakeSiftTracker(goal);
+  policies::VisualServoingOptions options;
+  if (!tape) options.frame_period_s = 1.0 / 15.0;  // what finding the features takes
+  return std::make_unique<policies::VisualServoingPolicy>(name, std::move(goal), std::move(tracker), options);
+}
+
+/// By the corners of red tape where the goal shows one, else by SIFT features.
+PolicyPointer MakeVisual(const PolicyRequest& request, const Shared& shared) {
+  const auto goal = shared.visual_goal->For(request.setup);
+  return MakeVisualServoing("visual-servoing", goal, policies::MakeTapeTracker(goal)->goal_features() > 0);
+}
+
+PolicyPointer MakeVisualTape(const PolicyRequest& request, const Shared& shared) {
+  return MakeVisualServoing("visual-servoing-tape", shared.visual_goal->For(request.setup), true);
+}
+
+PolicyPointer MakeVisualSift(const PolicyRequest& request, const Shared& shared) {
+  return MakeVisualServoing("visual-servoing-sift", shared.visual_goal->For(request.setup), false);
+}
+
+constexpr Entry kPolicies[] = {
+    {"database", true, true, MakeDatabase},
+    {"online", false, true, MakeOnline},
+    {"tbl", false, true, MakeTbl},
+    {"tbl-mesh", false, true, MakeTblMesh},
+    {"tbl-per-cost", false, true, MakeTblPerCost},
+    {"tbl-submodular", false, true, MakeTblSubmodular},
+    {"random", false, true, MakeRandom},
+    {"hybrid", true, true, MakeHybrid},
+    {"spiral", false, false, MakeSpiral},
+    {"open-loop", false, false, MakeOpenLoop},
+    {"visual-servoing", false, false, MakeVisual},
+    {"visual-servoing-tape", false, false, MakeVisualTape},
+    {"visual-servoing-sift", false, false, MakeVisualSift},
+};
+
+const Entry& Find(const std::string& name) {
+  for (const Entry& entry : kPolicies) {
+    if (name == entry.name) return entry;
+  }
+  std::string known;
+  for (const std::string& other : PolicyNames()) known += (known.empty() ? "" : ", ") + other;
+  throw InputError("--policy", "unknown policy \"" + name + "\"", "choose one of " + known);
+}
+
+struct Setting {
+  const char* key;
+  void (*set)(PolicyOptions& options, double value);
+};
+
+policies::SpiralTuning& Spiral(PolicyOptions& options) {
+  if (!options.spiral) options.spiral.emplace();
+  return *options.spiral;
+}
+
+constexpr Setting kSettings[] = {
+    {"tbl-actions", [](PolicyOptions& o, double v) { o.tbl_actions = static_cast<int>(v); }},
+    {"online-seconds", [](PolicyOptions& o, double v) { o.online.time_limit_s = v; }},
+    {"online-expansions", [](PolicyOptions& o, double v) { o.online.expansion_limit = static_cast<std::int64_t>(v); }},
+    {"spiral-pitch", [](PolicyOptions& o, double v) { Spiral(o).pitch_m = v; }},
+    {"spiral-speed", [](PolicyOptions& o, double v) { Spiral(o).speed_m_s = v; }},
+    {"spiral-force", [](PolicyOptions& o, double v) { Spiral(o).press_n = v; }},
+    {"hybrid-threshold", [](PolicyOptions& o, double v) { o.hybrid_threshold_m = v; }},
+};
+
+struct Tuned {
+  const char* task;
+  policies::SpiralTuning spiral;
+  double hybrid_threshold_m;
+};
+
+// Measured by `feeler experiment spiral-tuning` (the spirals) and `baselines` (the thresholds, where spiral and touch
+// take the same time): docs/experiments.md. The last one serves every task that is not named.
+constexpr Tuned kTuned[] = {
+    {"plug", {0.0025, 0.08, 20.0}, 0.006},
+    {"plug-tight", {0.0006, 0.04, 20.0}, 0.0},
+};
+
+const Tuned& TunedFor(const Task& task) {
+  const auto* tuned =
+      std::find_if(std::begin(kTuned), std::end(kTuned), [&](const Tuned& t) { return task.name == t.task; });
+  return tuned == std::end(kTuned) ? *std::prev(std::end(kTuned)) : *tuned;
+}
+
+}  // namespace
+
+PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings) {
+  PolicyOptions options;
+  for (const std::string& text : settings) {
+    const std::size_t equals = text.find('=');
+    const std::string key = text.substr(0, equals);
+    const auto* setting =
+        std::find_if(std::begin(kSettings), std::end(kSettings), [&](const Setting& s) { return key == s.key; });
+    if (setting == std::end(kSettings)) {
+      std::string known;
+      for (const Setting& s : kSettings) known += (known.empty() ? "" : ", ") + std::string(s.key);
+      throw InputError("--policy-option", "unknown option \"" + key + "\"", "KEY=VALUE with a KEY of " + known);
+    }
+    std::istringstream number(equals == std::string::npos ? "" : text.substr(equals + 1));
+    double value = 0.0;
+    if (!(number >> value) || !number.eof() || !std::isfinite(value) || value < 0.0 || value > 1e12) {
+      throw InputError("--policy-option", "\"" + text + "\" has no sensible value",
+                       "give KEY=NUMBER, e.g. " + key + "=1");
+    }
+    setting->set(options, value);
+  }
+  return options;
+}
+
+policies::SpiralTuning TunedSpiral(const Task& task) { return TunedFor(task).spiral; }
+double MeasuredHybridThreshold(const Task& task) { return TunedFor(task).hybrid_threshold_m; }
+
+std::vector<std::string> PolicyNames() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kPolicies) names.emplace_back(entry.name);
+  return names;
+}
+
+bool UsesLadder(const std::string& name) { return Find(name).uses_ladder; }
+
+PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database,
+                                const PolicyOptions& options) {
+  const Entry& entry = Find(name);
+  if (entry.needs_database && !database) {
+    throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
+  }
+  const auto shared = std::make_shared<const Shared>(Shared{std::move(database), options});
+  return [make = entry.make, shared](const PolicyRequest& request) { return make(request, *shared); };
+}
+
+}  // namespace feeler::workflow
