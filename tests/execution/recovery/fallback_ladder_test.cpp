@@ -17,6 +17,7 @@
 
 #include "feeler/execution/executor.h"
 #include "feeler/execution/lattice/yaw_fit.h"
+#include "feeler/execution/recovery/online_planner.h"
 #include "feeler/planner/family/problem_family.h"
 #include "tests/execution/box_world.h"
 

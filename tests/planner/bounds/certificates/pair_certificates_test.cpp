@@ -22,6 +22,7 @@
 #include "feeler/planner/bounds/planning_tables.h"
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/planner/policy/evaluate.h"
+#include "feeler/planner/solve.h"
 #include "tests/planner/random_problems.h"
 #include "tests/planner/synthetic_plug.h"
 

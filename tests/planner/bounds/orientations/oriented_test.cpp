@@ -22,6 +22,7 @@
 #include "feeler/planner/policy/freeze_policy.h"
 #include "feeler/planner/search/greedy_completion.h"
 #include "feeler/planner/search/random_judgement.h"
+#include "feeler/planner/solve.h"
 #include "tests/planner/oriented_problems.h"
 #include "tests/planner/synthetic_pipe.h"
 #include "tests/planner/synthetic_plug.h"
