@@ -23,8 +23,8 @@ std::shared_ptr<const Scene> PlugScene() {
   return scene;
 }
 
-EpisodeOptions Known(double aside_m = 0.0) {
-  EpisodeOptions options;
+ResetOptions Known(double aside_m = 0.0) {
+  ResetOptions options;
   options.world_T_target = PlugScene()->task.world_T_target;
   options.world_T_target->translation().x() += aside_m;
   return options;
@@ -133,7 +133,7 @@ BENCHMARK(VectorStep)->ArgNames({"threads", "steps"})->ArgsProduct({{1, 2}, {1, 
 
 void Reset(benchmark::State& state) {
   InsertionEnv env(PlugScene());
-  EpisodeOptions options;
+  ResetOptions options;
   for (auto _ : state) {
     ++options.episode;
     benchmark::DoNotOptimize(env.Reset(1, options));

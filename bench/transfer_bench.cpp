@@ -66,9 +66,9 @@ void BM_PlanTransfer(benchmark::State& state) {
   for (auto _ : state) {
     TransferSettings settings;
     settings.seed = random.Next();
-    const double begun_ms = ThreadCpuMilliseconds();
+    const double begun_ms = 1e3 * ThreadCpuSeconds();
     const planner::TransferPlan plan = PlanTransfer(checker, scene, start, RandomPose(random), settings);
-    times_ms.push_back(ThreadCpuMilliseconds() - begun_ms);
+    times_ms.push_back(1e3 * ThreadCpuSeconds() - begun_ms);
     checks += plan.checks;
     if (!plan.planned()) continue;
     ++planned;
