@@ -17,10 +17,11 @@ TEST(Docs, NameFilesThatExist) {
   for (const auto& entry : fs::directory_iterator(root / "docs")) {
     if (entry.path().extension() == ".md") pages.push_back(entry.path());
   }
+  // Names in capitals stand for a name of the reader's.
   static const std::regex kFile(
       "(feeler/)?((tests/"
       ")?(core|planner|policies|execution|env|cad|perception|workflow|evaluation|cli|bench|models|python)/"
-      "[A-Za-z0-9_/-]+\\.(h|cpp|xml|urdf|py))");
+      "[a-z0-9_/-]+\\.(h|cpp|xml|urdf|py))");
   int named = 0;
   for (const fs::path& page : pages) {
     std::ifstream in(page);

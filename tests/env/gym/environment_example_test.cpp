@@ -50,7 +50,7 @@ std::string Read(const std::string& path) {
 
 TEST(EnvironmentPage, ShowsAnExampleThatRuns) {
   EXPECT_GT(Example(), 0.15);
-  std::string source = Read("/tests/env/environment_example_test.cpp");
+  std::string source = Read("/tests/env/gym/environment_example_test.cpp");
   source.erase(0, source.find("// example begins\n") + 18);
   source.erase(source.find("// example ends"));
   EXPECT_NE(Read("/docs/environment.md").find("```cpp\n" + source + "```"), std::string::npos);
