@@ -31,7 +31,7 @@ class BoundedSearch {
   BoundedSearch(Model& model, Incumbent& incumbent, double gap, double inflation = 1.0)
       : model_(model), incumbent_(incumbent), gap_(gap), inflation_(inflation) {}
 
-  /// From `start` (which the incumbent must have solved) until the gap is closed or `stop(expansions)` says why not to
+  /// From `start` until the gap is closed or `stop(expansions)` says why not to
   /// go on.
   template <class Stop>
   std::optional<SolverStatus> Run(Belief start, Stop stop) {
@@ -99,10 +99,10 @@ class BoundedSearch {
       double lower = action.cost;
       double upper = action.cost;
       double guess = action.cost;
-      model_.ForEachSuccessor(action, [&](Belief next) {
-        lower += Lower(next);
-        upper += Upper(next);
-        guess += Node(next).guess;
+      ForEachShareOf(model_, action, [&](Belief next, double share) {
+        lower += share * Lower(next);
+        upper += share * Upper(next);
+        guess += share * Node(next).guess;
       });
       if (guess_action < 0 || guess < least_guess) {
         least_guess = guess;
@@ -131,11 +131,11 @@ class BoundedSearch {
   Belief WidestSuccessor(Belief b, int action) {
     Belief widest = kNone;
     double width = 0.0;
-    model_.ForEachSuccessor(model_.Actions(b)[static_cast<std::size_t>(action)], [&](Belief next) {
+    ForEachShareOf(model_, model_.Actions(b)[static_cast<std::size_t>(action)], [&](Belief next, double share) {
       if (Closed(next)) return;
       const double upper = Upper(next);
       // Where no policy is known yet, the belief's own lower bound stands for how much there is to learn.
-      const double here = upper < kInfinity ? upper - gap_ * Lower(next) : Lower(next);
+      const double here = share * (upper < kInfinity ? upper - gap_ * Lower(next) : Lower(next));
       if (widest == kNone || here > width) {
         widest = next;
         width = here;
