@@ -23,33 +23,39 @@ std::string Shown(std::string_view word) {
 
 }  // namespace
 
-CassandraTokens::CassandraTokens(std::string_view text, std::string name) : name_(std::move(name)) {
-  int line = 1;
-  for (std::size_t i = 0; i < text.size();) {
-    const char c = text[i];
-    if (c == '\n') ++line;
+CassandraTokens::CassandraTokens(std::string_view text, std::string name) : name_(std::move(name)), text_(text) {}
+
+bool CassandraTokens::Ahead(std::size_t count) const {
+  while (ahead_.size() <= count && at_ < text_.size()) {
+    const char c = text_[at_];
+    if (c == '\n') ++at_line_;
     if (IsSpace(c)) {
-      ++i;
+      ++at_;
     } else if (c == '#') {
-      while (i < text.size() && text[i] != '\n') ++i;
+      while (at_ < text_.size() && text_[at_] != '\n') ++at_;
     } else if (c == ':' || c == '*') {
-      tokens_.push_back({text.substr(i++, 1), line});
+      ahead_.push_back({text_.substr(at_++, 1), at_line_});
     } else {
-      const std::size_t begin = i;
-      while (i < text.size() && !IsSpace(text[i]) && text[i] != ':' && text[i] != '#' && text[i] != '*') ++i;
-      tokens_.push_back({text.substr(begin, i - begin), line});
+      const std::size_t begin = at_;
+      while (at_ < text_.size() && !IsSpace(text_[at_]) && text_[at_] != ':' && text_[at_] != '#' && text_[at_] != '*')
+        ++at_;
+      ahead_.push_back({text_.substr(begin, at_ - begin), at_line_});
     }
   }
+  return ahead_.size() > count;
 }
 
 std::string_view CassandraTokens::Next(std::string_view wanted) {
   if (done()) Fail(fmt::format("the file ends where {} should be", wanted), "is the file complete?");
-  return tokens_[at_++].text;
+  const Token token = ahead_.front();
+  ahead_.pop_front();
+  line_ = token.line;
+  return token.text;
 }
 
 bool CassandraTokens::Accept(std::string_view word) {
   if (done() || Peek() != word) return false;
-  ++at_;
+  Next(word);
   return true;
 }
 
@@ -61,7 +67,7 @@ void CassandraTokens::Expect(std::string_view word, std::string_view wanted) {
 bool CassandraTokens::AtStatement(std::size_t ahead) const {
   static constexpr std::string_view kKeywords[] = {"discount", "values", "states", "actions", "observations",
                                                    "start",    "T",      "O",      "R",       "E"};
-  if (at_ + ahead >= tokens_.size()) return true;
+  if (!Ahead(ahead)) return true;
   const std::string_view word = Peek(ahead);
   const std::string_view after = Peek(ahead + 1);
   if (std::ranges::find(kKeywords, word) == std::end(kKeywords)) return false;

@@ -23,7 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Controllers with more unknowns than this are not evaluated for a better value than the one that is proven already.
 constexpr std::size_t kEvaluatedUnknowns = 400'000;
 /// Beliefs of a controller written out of a search, at most.
-constexpr std::size_t kControllerNodes = 50'000;
+constexpr std::size_t kControllerNodes = 20'000;
 constexpr std::size_t kExperienceBeliefs = 50'000;
 
 /// The policies that always do the same, as an incumbent of BoundedSearch (which see for the interface).
@@ -171,10 +171,13 @@ class Attempt {
 
   double GiveUp() const { return Wall() + std::max(1.0, 0.05 * Wall()); }
 
-  /// The policy of a search; none if it would be too large, or takes long to write out.
+  /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
+  /// on blindly. Without discount that cannot be, nor that the policy is cut short for being too large: then there is
+  /// none.
   template <class ActionOf>
   std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of) {
     const double give_up_s = GiveUp();
+    const BlindIncumbent blind(graph, bounds_);
     PomdpController controller;
     std::map<std::uint32_t, std::uint32_t> number;
     std::vector<std::uint32_t> beliefs;
@@ -185,13 +188,19 @@ class Attempt {
     };
     of(graph.Start());
     for (std::size_t i = 0; i < beliefs.size(); ++i) {
-      if (beliefs.size() > kControllerNodes || Wall() > give_up_s) return std::nullopt;
-      const PomdpBeliefGraph::Action action =
-          graph.Actions(beliefs[i])[static_cast<std::size_t>(action_of(beliefs[i]))];
-      PomdpController::Node node{action.action, {}, static_cast<std::uint32_t>(i)};
-      for (std::uint32_t k = 0; k < action.count; ++k) {
-        const PomdpBeliefGraph::Successor next = graph.Successors(action)[k];
-        node.branches.push_back({next.observation, of(next.belief)});
+      const bool cut = beliefs.size() > kControllerNodes || Wall() > give_up_s;
+      const int index = cut ? -1 : action_of(beliefs[i]);
+      PomdpController::Node node{0, {}, static_cast<std::uint32_t>(i)};
+      if (index < 0) {
+        if (pomdp_.discount == 1.0) return std::nullopt;
+        node.action = static_cast<std::uint32_t>(blind.Action(beliefs[i]));
+      } else {
+        const PomdpBeliefGraph::Action action = graph.Actions(beliefs[i])[static_cast<std::size_t>(index)];
+        node.action = action.action;
+        for (std::uint32_t k = 0; k < action.count; ++k) {
+          const PomdpBeliefGraph::Successor next = graph.Successors(action)[k];
+          node.branches.push_back({next.observation, of(next.belief)});
+        }
       }
       controller.nodes.push_back(std::move(node));
     }
@@ -229,7 +238,7 @@ class Attempt {
     result_.beliefs = graph.size();
     result_.status = why.value_or(SolverStatus::kConverged);
     if (result_.value_lower == -kInfinity) return;
-    result_.controller = Freeze(graph, [&](std::uint32_t b) { return search.Action(b); });
+    result_.controller = Freeze(graph, [&](std::uint32_t b) { return search.Improved(b) ? search.Action(b) : -1; });
   }
 
   void Rtdp() {
