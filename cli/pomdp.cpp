@@ -144,6 +144,9 @@ void RunSimulate(const SimulateFlags& flags, Session& session) {
 }  // namespace
 
 void PomdpFlags::AddTo(CLI::App& command) {
+  command.get_option("--solver")
+      ->description(
+          "rtdp-bel, e-rtdp-bel or certified; with --pomdp also point-based, the default there for discounts below 1");
   command.add_option("--pomdp", pomdp, "general POMDP: .pomdp (Cassandra's format) or .pomdpx (APPL's), docs/pomdp.md");
   command.add_option("--precision", precision, "with --pomdp: stop when value_upper - value_lower is at most this")
       ->capture_default_str();

@@ -23,7 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Controllers with more unknowns than this are not evaluated for a better value than the one that is proven already.
 constexpr std::size_t kEvaluatedUnknowns = 400'000;
 /// Beliefs of a controller written out of a search, at most.
-constexpr std::size_t kControllerNodes = 20'000;
+constexpr std::size_t kControllerNodes = 5'000;
 constexpr std::size_t kExperienceBeliefs = 50'000;
 
 /// The policies that always do the same, as an incumbent of BoundedSearch (which see for the interface).

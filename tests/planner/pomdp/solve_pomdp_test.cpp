@@ -69,9 +69,11 @@ TEST_P(RandomModels, BoundsHoldAndMeet) {
   EXPECT_GE(BestRow(bounds.informed, pomdp.start), truth.low);
   EXPECT_LE(BestRow(bounds.informed, pomdp.start), BestRow(bounds.qmdp, pomdp.start) + 1e-12);
   for (const PomdpSolverKind kind : {PomdpSolverKind::kPointBased, PomdpSolverKind::kCertified}) {
-    const PomdpResult result = Solve(pomdp, kind);
+    // A tree of exact beliefs closes later.
+    const double precision = kind == PomdpSolverKind::kPointBased ? 1e-3 : 0.02;
+    const PomdpResult result = Solve(pomdp, kind, precision);
     EXPECT_EQ(result.status, SolverStatus::kConverged);
-    EXPECT_LE(result.value_upper - result.value_lower, 1e-3 + 1e-12);
+    EXPECT_LE(result.value_upper - result.value_lower, precision + 1e-12);
     EXPECT_LE(result.value_lower, truth.high + 1e-9) << ToString(kind);
     EXPECT_GE(result.value_upper, truth.low - 1e-9) << ToString(kind);
     ASSERT_TRUE(result.controller);
