@@ -1,12 +1,16 @@
 // feeler export: a lattice problem in the formats of other POMDP solvers.
+#include <cstdio>
 #include <iostream>
 #include <limits>
 #include <memory>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/pomdp/files/pomdp_file.h"
+#include "feeler/planner/pomdp/model/rock_sample.h"
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/policies/io/pomdp_export.h"
 
@@ -15,21 +19,14 @@ namespace {
 
 struct Flags {
   std::string problem;
+  std::string rock_sample;
+  std::int64_t seed = 1;
   std::string format = "pomdp";
   std::string out;
   double upper_bound = std::numeric_limits<double>::infinity();
 };
 
-void Run(const Flags& flags) {
-  if (flags.format != "pomdp" && flags.format != "pomdpx") {
-    throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
-  }
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
-  const planner::Problem problem = planner::MakeLatticeProblem(policies::ReadLatticeProblem(flags.problem));
-  policies::PomdpOptions options;
-  options.upper_bound = flags.upper_bound;
-  const std::string text =
-      flags.format == "pomdp" ? policies::FormatPomdp(problem, options) : policies::FormatPomdpx(problem, options);
+void Write(const Flags& flags, const std::string& text) {
   if (flags.out.empty()) {
     std::cout << text;
   } else {
@@ -37,12 +34,45 @@ void Run(const Flags& flags) {
   }
 }
 
+/// "7x8": a grid of 7 by 7 with 8 rocks, drawn from the seed.
+std::string RockSampleText(const Flags& flags) {
+  int size = 0;
+  int rocks = 0;
+  char rest = 0;
+  if (flags.format != "pomdp") throw InputError("--format", "RockSample is written as pomdp", "leave it out");
+  if (std::sscanf(flags.rock_sample.c_str(), "%4dx%4d%c", &size, &rocks, &rest) != 2) {
+    throw InputError("--rock-sample", "\"" + flags.rock_sample + "\"", "give size and rocks, e.g. 7x8");
+  }
+  return planner::FormatCassandraPomdp(
+      planner::MakeRockSample(planner::DrawRockSample(size, rocks, ParseSeed(flags.seed))));
+}
+
+void Run(const Flags& flags) {
+  if (flags.format != "pomdp" && flags.format != "pomdpx") {
+    throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
+  }
+  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  if (flags.problem.empty() == flags.rock_sample.empty()) {
+    throw InputError("export", "give either --problem or --rock-sample", "see feeler export --help");
+  }
+  if (!flags.rock_sample.empty()) return Write(flags, RockSampleText(flags));
+  const planner::Problem problem = planner::MakeLatticeProblem(policies::ReadLatticeProblem(flags.problem));
+  policies::PomdpOptions options;
+  options.upper_bound = flags.upper_bound;
+  const std::string text =
+      flags.format == "pomdp" ? policies::FormatPomdp(problem, options) : policies::FormatPomdpx(problem, options);
+  Write(flags, text);
+}
+
 }  // namespace
 
 void AddExportCommand(CLI::App& app, Session& /*session*/) {
   auto flags = std::make_shared<Flags>();
   CLI::App* command = app.add_subcommand("export", "Write a lattice problem for other POMDP solvers");
-  command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)")->required();
+  command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
+  command->add_option("--rock-sample", flags->rock_sample,
+                      "write a RockSample benchmark instead, e.g. 7x8: 7 x 7 cells, 8 rocks drawn from the seed");
+  command->add_option("--seed", flags->seed, "of the rocks")->capture_default_str();
   command->add_option("--format", flags->format, "pomdp (Cassandra's) or pomdpx (mixed observability)")
       ->capture_default_str();
   command->add_option("--out", flags->out, "file to write (default: standard output)");

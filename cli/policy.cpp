@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/pomdp.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
@@ -116,9 +117,10 @@ void Graph(const Flags& flags) {
 
 }  // namespace
 
-void AddPolicyCommand(CLI::App& app, Session& /*session*/) {
+void AddPolicyCommand(CLI::App& app, Session& session) {
   CLI::App* policy = app.add_subcommand("policy", "Look at one policy");
   policy->require_subcommand(1);
+  AddPolicySimulateCommand(*policy, session);
   auto flags = std::make_shared<Flags>();
   CLI::App* command = policy->add_subcommand("graph", "Draw a policy of a file or a database");
   command->add_option("--policy", flags->policy, "policy file (docs/file-formats.md)");

@@ -8,6 +8,7 @@
 
 #include "feeler/cli/commands.h"
 #include "feeler/cli/policy_output.h"
+#include "feeler/cli/pomdp.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
@@ -30,11 +31,12 @@ struct Flags {
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
   SolverFlags solver;
+  PomdpFlags pomdp;
 };
 
 planner::Problem LoadProblem(const Flags& flags) {
   if (flags.task.empty() == flags.problem.empty()) {
-    throw InputError("solve", "give either --task with --extents, or --problem", "see feeler solve --help");
+    throw InputError("solve", "give either --task with --extents, or --problem, or --pomdp", "see feeler solve --help");
   }
   if (!flags.problem.empty()) {
     if (ParseCost(flags.cost) == CostKind::kTime) {
@@ -83,6 +85,10 @@ void PrintResult(const planner::SolverResult& result, const std::string& unit) {
 }
 
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  if (!flags.pomdp.pomdp.empty()) {
+    return RunSolvePomdp(command, flags.pomdp, flags.solver, flags.out, flags.json, session);
+  }
+  RequireNoPomdpFlags(command);
   planner::SolverOptions options = flags.solver.Options(command);
   options.cancellation = session.cancellation;
   if (!flags.out.empty()) RequireWritable("--out", flags.out);
@@ -161,6 +167,7 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   command->add_option("--jobs", flags->jobs, "threads, for contact map and tables")->capture_default_str();
   command->add_flag("--json", flags->json, "print the result as JSON");
   flags->solver.AddTo(*command);
+  flags->pomdp.AddTo(*command);
   command->callback([command, flags, &session] { Run(*command, *flags, session); });
 }
 

@@ -245,6 +245,7 @@ std::string_view ToString(SolverStatus status) {
     case SolverStatus::kExpansionLimit: return "expansion_limit";
     case SolverStatus::kCancelled: return "cancelled";
     case SolverStatus::kUnlocalizable: return "unlocalizable";
+    case SolverStatus::kMemoryLimit: return "memory_limit";
   }
   return "?";
 }

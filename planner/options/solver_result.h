@@ -10,8 +10,8 @@
 
 namespace feeler::planner {
 
-enum class SolverStatus { kConverged, kGap, kTimeLimit, kExpansionLimit, kCancelled, kUnlocalizable };
-/// "converged", "gap", "time_limit", "expansion_limit", "cancelled", "unlocalizable".
+enum class SolverStatus { kConverged, kGap, kTimeLimit, kExpansionLimit, kCancelled, kUnlocalizable, kMemoryLimit };
+/// "converged", "gap", "time_limit", "expansion_limit", "cancelled", "unlocalizable", "memory_limit".
 std::string_view ToString(SolverStatus status);
 
 struct SolverResult {

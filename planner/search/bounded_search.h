@@ -31,7 +31,7 @@ class BoundedSearch {
   BoundedSearch(Model& model, Incumbent& incumbent, double gap, double inflation = 1.0)
       : model_(model), incumbent_(incumbent), gap_(gap), inflation_(inflation) {}
 
-  /// From `start` (which the incumbent must have solved) until the gap is closed or `stop(expansions)` says why not to
+  /// From `start` until the gap is closed or `stop(expansions)` says why not to
   /// go on.
   template <class Stop>
   std::optional<SolverStatus> Run(Belief start, Stop stop) {
@@ -58,6 +58,8 @@ class BoundedSearch {
   double Upper(Belief b) { return std::min(Node(b).upper, incumbent_.Solved(b) ? incumbent_.Value(b) : kInfinity); }
   /// The action of the best policy found: an index into Model::Actions.
   int Action(Belief b) { return Node(b).action >= 0 ? Node(b).action : incumbent_.Action(b); }
+  /// False where the best policy found is the incumbent's.
+  bool Improved(Belief b) { return Node(b).action >= 0; }
   std::int64_t trials() const { return trials_; }
   std::int64_t expansions() const { return expansions_ + incumbent_.expansions(); }
 
@@ -65,6 +67,7 @@ class BoundedSearch {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   static constexpr Belief kNone = ~Belief{0};
   static constexpr std::size_t kLongestTrial = 10000;
+  static constexpr double kUnknownFirst = 1e100;
   struct State {
     double lower = -1.0;  ///< negative: not met yet
     double upper = kInfinity;
@@ -99,10 +102,10 @@ class BoundedSearch {
       double lower = action.cost;
       double upper = action.cost;
       double guess = action.cost;
-      model_.ForEachSuccessor(action, [&](Belief next) {
-        lower += Lower(next);
-        upper += Upper(next);
-        guess += Node(next).guess;
+      ForEachShareOf(model_, action, [&](Belief next, double share) {
+        lower += share * Lower(next);
+        upper += share * Upper(next);
+        guess += share * Node(next).guess;
       });
       if (guess_action < 0 || guess < least_guess) {
         least_guess = guess;
@@ -131,11 +134,13 @@ class BoundedSearch {
   Belief WidestSuccessor(Belief b, int action) {
     Belief widest = kNone;
     double width = 0.0;
-    model_.ForEachSuccessor(model_.Actions(b)[static_cast<std::size_t>(action)], [&](Belief next) {
+    ForEachShareOf(model_, model_.Actions(b)[static_cast<std::size_t>(action)], [&](Belief next, double share) {
       if (Closed(next)) return;
       const double upper = Upper(next);
-      // Where no policy is known yet, the belief's own lower bound stands for how much there is to learn.
-      const double here = upper < kInfinity ? upper - gap_ * Lower(next) : Lower(next);
+      // Where no policy is known yet, the belief's own lower bound stands for how much there is to learn. Where a
+      // policy may return to a belief, such a belief comes first: else a trial may go round without ever meeting it.
+      const double unknown = HasShares<Model> ? kUnknownFirst : 1.0;
+      const double here = share * (upper < kInfinity ? upper - gap_ * Lower(next) : unknown * Lower(next));
       if (widest == kNone || here > width) {
         widest = next;
         width = here;

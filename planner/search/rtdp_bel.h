@@ -22,8 +22,8 @@ namespace feeler::planner {
 ///
 /// Convergence: a belief is *solved* when every belief reachable from it by greedy actions satisfies V(b) = Q(b, a) (up
 /// to rounding); its greedy action is frozen there and then, and its value never changes again. Along frozen actions
-/// V(b) = C(b,a) + sum P V(b'), so the frozen policy is acyclic (a cycle would cost nothing) and costs exactly V(b) <=
-/// epsilon V*(b). The labelling procedure is LRTDP's CheckSolved (Bonet and Geffner 2003).
+/// V(b) = C(b,a) + sum P V(b'), so the frozen policy is acyclic where beliefs only shrink, as in lattice problems (a cycle
+/// would cost nothing), and costs V(b) <= epsilon V*(b), up to rounding; in general POMDPs it may return to a belief. The labelling procedure is LRTDP's CheckSolved (Bonet and Geffner 2003).
 ///
 /// Beside V the algorithm keeps L, started at heur and never inflated, backed up with the same actions: a lower bound
 /// at any time.
@@ -102,10 +102,10 @@ class RtdpBel {
     for (const auto& action : model_.Actions(b)) {
       double value = action.cost;
       double lower = action.cost;
-      model_.ForEachSuccessor(action, [&](Belief next) {
+      ForEachShareOf(model_, action, [&](Belief next, double share) {
         const State& node = Node(next);
-        value += node.value;
-        lower += node.lower;
+        value += share * node.value;
+        lower += share * node.lower;
       });
       if (best.action < 0 || value <= best.value * (1.0 + 1e-12)) {
         best.action = index;
@@ -127,17 +127,25 @@ class RtdpBel {
 
   /// Lines 8-10. The outcome of a state sampled from b_start and followed down the trial has the probability P(z | b,
   /// a), weight of the successor over weight of the belief; sampling outcomes is the same process. Only outcomes that
-  /// are neither goals nor solved are drawn.
+  /// are neither goals nor solved are drawn, except that trials in models with shares, whose policies may go round for
+  /// ever, end at the goal as often as it is met.
   Belief SampleSuccessor(Belief b, int action) {
     double open = 0.0;
     const auto& chosen = model_.Actions(b)[static_cast<std::size_t>(action)];
-    model_.ForEachSuccessor(chosen, [&](Belief next) { open += Solved(next) ? 0.0 : model_.Weight(next); });
+    ForEachShareOf(model_, chosen, [&](Belief next, double share) {
+      open += Solved(next) ? 0.0 : share * model_.Weight(next);
+    });
     if (open == 0.0) return kGoalOrSolved;
+    if constexpr (HasShares<Model>) {
+      double left = model_.Weight(b);
+      ForEachShareOf(model_, chosen, [&](Belief next, double share) { left -= share * model_.Weight(next); });
+      if (random_.Uniform() * (open + std::max(0.0, left)) >= open) return kGoalOrSolved;
+    }
     double at = random_.Uniform() * open;
     Belief sampled = kGoalOrSolved;
-    model_.ForEachSuccessor(chosen, [&](Belief next) {
+    ForEachShareOf(model_, chosen, [&](Belief next, double share) {
       if (Solved(next) || (at < 0.0 && sampled != kGoalOrSolved)) return;
-      at -= model_.Weight(next);
+      at -= share * model_.Weight(next);
       sampled = next;
     });
     return sampled;
@@ -163,7 +171,7 @@ class RtdpBel {
         consistent = false;
         continue;
       }
-      model_.ForEachSuccessor(model_.Actions(b)[static_cast<std::size_t>(best.action)], [&](Belief next) {
+      ForEachShareOf(model_, model_.Actions(b)[static_cast<std::size_t>(best.action)], [&](Belief next, double) {
         State& state = Node(next);
         if (state.solved || state.visit == visit_) return;
         state.visit = visit_;

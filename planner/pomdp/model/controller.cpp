@@ -1,0 +1,128 @@
+#include "feeler/planner/pomdp/model/controller.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "feeler/core/error.h"
+
+namespace feeler::planner {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPrecision = 1e-12;
+constexpr int kSweeps = 100000;
+
+/// The linear system of a controller: rows of the pairs (node, state) that can be met.
+struct System {
+  std::vector<SparseEntry> start;
+  SparseRows rows;  ///< discounted
+  std::vector<double> reward;
+  std::vector<std::uint8_t> final;  ///< of goals: value 0
+
+  explicit System(const Pomdp& pomdp, const PomdpController& controller) {
+    const std::vector<std::uint8_t> absorbing = AbsorbingStates(pomdp);
+    std::unordered_map<std::uint64_t, std::uint32_t> number;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+    const auto of = [&](std::uint32_t node, std::uint32_t state) {
+      const auto [found, added] =
+          number.try_emplace(std::uint64_t{node} << 32 | state, static_cast<std::uint32_t>(pairs.size()));
+      if (added) pairs.emplace_back(node, state);
+      return found->second;
+    };
+    for (const SparseEntry& s : pomdp.start) start.push_back({of(controller.root, s.index), s.value});
+    std::vector<SparseEntry> row;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const auto [n, s] = pairs[i];
+      const PomdpController::Node& node = controller.nodes[n];
+      row.clear();
+      final.push_back(absorbing[s]);
+      reward.push_back(absorbing[s] != 0 ? 0.0 : pomdp.reward[pomdp.At(node.action, s)]);
+      if (absorbing[s] == 0) {
+        for (const SparseEntry& next : pomdp.transitions.Row(pomdp.At(node.action, s))) {
+          for (const SparseEntry& o : pomdp.observation_rows.Row(pomdp.At(node.action, next.index))) {
+            row.push_back({of(controller.Next(n, o.index), next.index), pomdp.discount * next.value * o.value});
+          }
+        }
+      }
+      rows.Append(row);
+    }
+  }
+
+  /// Without discount a value is finite only where every pair can still come to a goal.
+  bool Proper() const {
+    std::vector<std::uint8_t> ends = final;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t i = ends.size(); i-- > 0;) {
+        if (ends[i] != 0) continue;
+        const auto row = rows.Row(i);
+        if (std::ranges::any_of(row, [&](const SparseEntry& next) { return ends[next.index] != 0; }))
+          ends[i] = 1, changed = true;
+      }
+    }
+    return std::ranges::all_of(ends, [](std::uint8_t e) { return e != 0; });
+  }
+};
+
+}  // namespace
+
+std::uint32_t PomdpController::Next(std::uint32_t node, std::uint32_t observation) const {
+  const std::vector<Branch>& branches = nodes[node].branches;
+  const auto found = std::ranges::lower_bound(branches, observation, {}, &Branch::observation);
+  return found != branches.end() && found->observation == observation ? found->next : nodes[node].otherwise;
+}
+
+std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
+                                                  const std::function<bool()>& stop) {
+  const System system(pomdp, controller);
+  ControllerValue result;
+  result.unknowns = system.reward.size();
+  if (pomdp.discount == 1.0 && !system.Proper()) {
+    result.value = -kInfinity;
+    return result;
+  }
+  std::vector<double> values(result.unknowns, 0.0);
+  double scale = 1.0;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    result.residual = 0.0;
+    // Backwards: successors come after what leads to them, mostly.
+    for (std::size_t i = values.size(); i-- > 0;) {
+      double value = system.reward[i];
+      for (const SparseEntry& next : system.rows.Row(i)) value += next.value * values[next.index];
+      result.residual = std::max(result.residual, std::abs(value - values[i]));
+      values[i] = value;
+      scale = std::max(scale, std::abs(value));
+    }
+    if (result.residual <= kPrecision * scale) break;
+    if (stop && stop()) return std::nullopt;
+  }
+  for (const SparseEntry& s : system.start) result.value += s.value * values[s.index];
+  // |V - V^| <= residual / (1 - discount) in discounted systems.
+  if (pomdp.discount < 1.0) result.value -= result.residual * pomdp.discount / (1.0 - pomdp.discount);
+  return result;
+}
+
+void Validate(const Pomdp& pomdp, const PomdpController& controller, const std::string& where) {
+  const auto require = [&](bool holds, std::size_t node, const char* what) {
+    if (!holds) throw InputError(where, fmt::format("node {}: {}", node, what), "is the policy of another model?");
+  };
+  require(controller.root < controller.nodes.size(), controller.root, "the root does not exist");
+  for (std::size_t n = 0; n < controller.nodes.size(); ++n) {
+    const PomdpController::Node& node = controller.nodes[n];
+    require(node.action < pomdp.action_count(), n, "no such action");
+    require(node.otherwise < controller.nodes.size(), n, "the node after other observations does not exist");
+    for (const PomdpController::Branch& branch : node.branches) {
+      require(branch.observation < pomdp.observation_count(), n, "no such observation");
+      require(branch.next < controller.nodes.size(), n, "a branch leads nowhere");
+    }
+    require(std::ranges::adjacent_find(node.branches, std::ranges::greater_equal(),
+                                       &PomdpController::Branch::observation) == node.branches.end(),
+            n, "observations twice or out of order");
+  }
+}
+
+}  // namespace feeler::planner

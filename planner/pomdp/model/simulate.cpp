@@ -1,0 +1,77 @@
+#include "feeler/planner/pomdp/model/simulate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "feeler/planner/pomdp/model/belief_update.h"
+
+namespace feeler::planner {
+namespace {
+
+constexpr int kUndiscountedSteps = 100000;
+
+std::uint32_t Draw(std::span<const SparseEntry> row, RandomStream& random) {
+  double at = random.Uniform();
+  for (const SparseEntry& entry : row) {
+    at -= entry.value;
+    if (at < 0.0) return entry.index;
+  }
+  return row.back().index;
+}
+
+int StepsThatMatter(const Pomdp& pomdp) {
+  if (pomdp.discount == 1.0) return kUndiscountedSteps;
+  return static_cast<int>(std::ceil(std::log(1e-6 * (1.0 - pomdp.discount)) / std::log(pomdp.discount)));
+}
+
+}  // namespace
+
+void BeliefAgent::Observe(std::uint32_t action, std::uint32_t observation) {
+  BeliefUpdate update(pomdp_);
+  std::vector<SparseEntry> next;
+  update(belief_, action, [&](std::uint32_t o, double, const std::vector<SparseEntry>& belief) {
+    if (o == observation) next = belief;
+  });
+  if (!next.empty()) belief_ = std::move(next);  // what the model calls impossible is rounding
+}
+
+SimulationResult SimulatePomdp(const Pomdp& pomdp, PomdpAgent& agent, const SimulationOptions& options) {
+  const std::vector<std::uint8_t> absorbing = AbsorbingStates(pomdp);
+  const int longest = options.max_steps > 0 ? options.max_steps : StepsThatMatter(pomdp);
+  SimulationResult result;
+  double squares = 0.0;
+  double steps = 0.0;
+  for (int episode = 0; episode < options.episodes; ++episode) {
+    if (options.cancellation != nullptr && options.cancellation->cancelled()) break;
+    if (options.progress && episode % 100 == 0) options.progress(episode, options.episodes);
+    RandomStream random(options.seed, static_cast<std::uint64_t>(episode), "pomdp-episode");
+    agent.Reset();
+    std::uint32_t state = Draw(pomdp.start, random);
+    double sum = 0.0;
+    double weight = 1.0;
+    int step = 0;
+    for (; step < longest && absorbing[state] == 0; ++step) {
+      const std::uint32_t action = agent.Act();
+      sum += weight * pomdp.reward[pomdp.At(action, state)];
+      weight *= pomdp.discount;
+      state = Draw(pomdp.transitions.Row(pomdp.At(action, state)), random);
+      agent.Observe(action, Draw(pomdp.observation_rows.Row(pomdp.At(action, state)), random));
+    }
+    result.at_goal += absorbing[state] != 0 ? 1 : 0;
+    result.cut_short += absorbing[state] == 0 && (options.max_steps > 0 || pomdp.discount == 1.0) ? 1 : 0;
+    ++result.episodes;
+    steps += step;
+    const double delta = sum - result.mean;  // Welford
+    result.mean += delta / result.episodes;
+    squares += delta * (sum - result.mean);
+  }
+  if (result.episodes > 1) {
+    constexpr double kNormal95 = 1.959964;
+    result.half_width = kNormal95 * std::sqrt(squares / (result.episodes - 1) / result.episodes);
+    result.steps_mean = steps / result.episodes;
+  }
+  if (options.progress) options.progress(options.episodes, options.episodes);
+  return result;
+}
+
+}  // namespace feeler::planner

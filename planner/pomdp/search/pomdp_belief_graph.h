@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "feeler/planner/pomdp/model/belief_update.h"
+#include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/state_bounds.h"
+
+namespace feeler::planner {
+
+/// The belief MDP of a POMDP as a model of the searches (BeliefModel), grown on demand: costs to a goal.
+///
+/// A discounted POMDP becomes a goal POMDP (Bonet and Geffner 2009, Section 5; Theorem 5 there): with C the greatest
+/// reward, an action costs C - R(b, a), and with probability 1 - discount it ends at the goal. All values then obey
+/// V*(b) = C / (1 - discount) - V*_goal(b) (adding a constant to all rewards shifts values by it over 1 - discount).
+/// The goal is left out of the successors, so that shares sum to the discount. With a discount of 1 costs are negated
+/// rewards and the absorbing states are the goals. Beliefs within absorbing states have a known value, and count as
+/// goals; what they cost is part of the action that leads to them.
+///
+/// Beliefs are normalised, weights are 1. `levels` = 0: two beliefs are one if they agree up to rounding (1e-12), and
+/// what a search proves here holds for the POMDP. `levels` = D > 0: RTDP-Bel's discretisation, d(b)(s) = ceil(D b(s));
+/// the first belief met stands for all that share its d(b), and nothing is proven.
+class PomdpBeliefGraph {
+ public:
+  struct Action {
+    double cost = 0.0;
+    std::uint32_t action = 0;  ///< of the POMDP
+    std::uint32_t first = 0, count = 0;
+  };
+  struct Successor {
+    std::uint32_t belief = 0;
+    std::uint32_t observation = 0;
+    double share = 0.0;  ///< probability times discount
+  };
+
+  PomdpBeliefGraph(const Pomdp& pomdp, const StateBounds& bounds, int levels);
+
+  /// The start belief; a goal if Trivial().
+  std::uint32_t Start() const { return 0; }
+  /// True if the initial belief lies within absorbing states.
+  bool Trivial() const { return IsGoal(pomdp_.start); }
+  std::size_t size() const { return beliefs_.size(); }
+  double Weight(std::uint32_t /*b*/) const { return 1.0; }
+  double Heuristic(std::uint32_t b) const { return beliefs_[b].heuristic; }
+  bool expanded(std::uint32_t b) const { return beliefs_[b].first_action != kUnexpanded; }
+  std::span<const Action> Actions(std::uint32_t b) {
+    if (!expanded(b)) Expand(b);
+    return {actions_.data() + beliefs_[b].first_action, beliefs_[b].action_count};
+  }
+  template <class F>
+  void ForEachShare(const Action& action, F f) const {
+    for (std::uint32_t i = action.first; i < action.first + action.count; ++i)
+      f(successors_[i].belief, successors_[i].share);
+  }
+  /// Every outcome of an action that is no goal, with its observation.
+  std::span<const Successor> Successors(const Action& action) const {
+    return {successors_.data() + action.first, action.count};
+  }
+
+  const Pomdp& pomdp() const { return pomdp_; }
+  std::span<const SparseEntry> Belief(std::uint32_t b) const { return beliefs_[b].states; }
+  bool IsGoal(std::span<const SparseEntry> belief) const;
+  /// Lower bound of the cost of a belief: from the fast informed bound.
+  double HeuristicOf(std::span<const SparseEntry> belief) const { return to_goal_ - BestRow(bounds_.informed, belief); }
+  /// The number of a belief; kNone if it has not been met.
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::uint32_t Find(std::span<const SparseEntry> belief) const;
+  std::uint32_t Intern(std::vector<SparseEntry> belief);
+  /// Cost to reward and back: value + cost = this.
+  double to_goal() const { return to_goal_; }
+  /// C - R(b, a) for any belief.
+  double CostOf(std::span<const SparseEntry> belief, std::size_t action) const;
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  static constexpr std::uint32_t kUnexpanded = ~std::uint32_t{0};
+  struct Node {
+    std::vector<SparseEntry> states;
+    double heuristic = 0.0;
+    std::uint32_t first_action = kUnexpanded;
+    std::uint32_t action_count = 0;
+  };
+  std::int64_t Level(double probability) const;
+  std::uint64_t HashOf(std::span<const SparseEntry> belief) const;
+  bool Same(std::span<const SparseEntry> a, std::span<const SparseEntry> b) const;
+  void Expand(std::uint32_t b);
+
+  const Pomdp& pomdp_;
+  const StateBounds& bounds_;
+  int levels_;
+  std::vector<std::uint8_t> absorbing_;
+  double constant_ = 0.0;  ///< C
+  double to_goal_ = 0.0;   ///< C / (1 - discount); 0 with a discount of 1
+  std::vector<Node> beliefs_;
+  std::vector<Action> actions_;
+  std::vector<Successor> successors_;
+  std::unordered_multimap<std::uint64_t, std::uint32_t> index_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace feeler::planner

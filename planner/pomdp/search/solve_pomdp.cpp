@@ -1,0 +1,365 @@
+#include "feeler/planner/pomdp/search/solve_pomdp.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "feeler/core/error.h"
+#include "feeler/planner/pomdp/model/observable_classes.h"
+#include "feeler/planner/pomdp/search/point_based_search.h"
+#include "feeler/planner/pomdp/search/pomdp_belief_graph.h"
+#include "feeler/planner/pomdp/search/pomdp_experience.h"
+#include "feeler/planner/search/bounded_search.h"
+#include "feeler/planner/search/rtdp_bel.h"
+
+namespace feeler::planner {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Controllers with more unknowns than this are not evaluated for a better value than the one that is proven already.
+constexpr std::size_t kEvaluatedUnknowns = 400'000;
+/// Beliefs of a controller written out of a search, at most.
+constexpr std::size_t kControllerNodes = 5'000;
+constexpr std::size_t kExperienceBeliefs = 50'000;
+
+/// The policies that always do the same, as an incumbent of BoundedSearch (which see for the interface).
+class BlindIncumbent {
+ public:
+  BlindIncumbent(const PomdpBeliefGraph& graph, const StateBounds& bounds) : graph_(graph), bounds_(bounds) {}
+  bool Solved(std::uint32_t /*b*/) const { return graph_.pomdp().discount < 1.0; }
+  double Value(std::uint32_t b) const { return graph_.to_goal() - BestRow(bounds_.blind, graph_.Belief(b)); }
+  int Action(std::uint32_t b) const {
+    int best = 0;
+    double most = -kInfinity;
+    for (std::size_t a = 0; a < bounds_.blind.size(); ++a) {
+      double value = 0.0;
+      for (const SparseEntry& s : graph_.Belief(b)) value += s.value * bounds_.blind[a][s.index];
+      if (value > most) most = value, best = static_cast<int>(a);
+    }
+    return best;
+  }
+  std::int64_t expansions() const { return 0; }
+
+ private:
+  const PomdpBeliefGraph& graph_;
+  const StateBounds& bounds_;
+};
+
+class Attempt {
+ public:
+  Attempt(const Pomdp& whole, const PomdpSolverOptions& options)
+      : options_(options),
+        start_(std::chrono::steady_clock::now()),
+        cpu_start_s_(ThreadCpuSeconds()),
+        states_(ReachableStates(whole)),
+        pomdp_(Restrict(whole, states_)) {
+    for (const double r : pomdp_.reward) least_reward_ = std::min(least_reward_, r);
+  }
+
+  PomdpResult Run() {
+    RequireReachableGoal();
+    bounds_ = ComputeStateBounds(pomdp_, {.stop = [this] { return Stop(0).has_value(); }});
+    result_.value_upper = BestRow(bounds_.informed, pomdp_.start);
+    result_.value_lower = BestRow(bounds_.blind, pomdp_.start);
+    Row(true);
+    switch (options_.kind) {
+      case PomdpSolverKind::kPointBased: PointBased(); break;
+      case PomdpSolverKind::kCertified: Certified(); break;
+      case PomdpSolverKind::kRtdpBel:
+      case PomdpSolverKind::kERtdpBel: Rtdp(); break;
+    }
+    result_.value_upper = std::max(result_.value_upper, result_.value_lower);  // rounding
+    Row(true);
+    result_.wall_s = Wall();
+    result_.cpu_s = ThreadCpuSeconds() - cpu_start_s_;
+    return std::move(result_);
+  }
+
+ private:
+  double Wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  std::optional<SolverStatus> Stop(std::int64_t expansions) const {
+    if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
+    if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
+    if (Wall() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
+    return std::nullopt;
+  }
+
+  void Row(bool now) {
+    if (!options_.on_bounds) return;
+    const double wall = Wall();
+    if (!now && wall < next_row_s_) return;
+    next_row_s_ = std::max(0.1, wall * 1.25);
+    options_.on_bounds({wall, result_.trials, result_.expansions, result_.value_lower, result_.value_upper});
+  }
+
+  /// Without discount: from each state some way must lead to a goal, or no policy has a finite value.
+  void RequireReachableGoal() const {
+    if (pomdp_.discount < 1.0) return;
+    std::vector<std::uint8_t> ends = AbsorbingStates(pomdp_);
+    // Keeps the states from which some action stays among the kept ones and may come nearer: the goal for certain.
+    std::vector<std::uint8_t> kept(ends.size(), 1);
+    for (bool changed = true; changed;) {
+      changed = false;
+      std::vector<std::uint8_t> near = ends;
+      for (bool grew = true; grew;) {
+        grew = false;
+        for (std::size_t s = 0; s < near.size(); ++s) {
+          if (near[s] != 0 || kept[s] == 0) continue;
+          for (std::size_t a = 0; a < pomdp_.action_count() && near[s] == 0; ++a) {
+            const auto row = pomdp_.transitions.Row(pomdp_.At(a, s));
+            const bool stays = std::ranges::all_of(row, [&](const SparseEntry& n) { return kept[n.index] != 0; });
+            const bool nearer = std::ranges::any_of(row, [&](const SparseEntry& n) { return near[n.index] != 0; });
+            if (stays && nearer) near[s] = 1, grew = true;
+          }
+        }
+      }
+      changed = near != kept;
+      kept = near;
+    }
+    for (const SparseEntry& s : pomdp_.start) {
+      if (kept[s.index] != 0) continue;
+      throw NegativeResult(
+          pomdp_.name, fmt::format("no policy reaches a goal from state \"{}\" for certain", pomdp_.states[s.index]));
+    }
+  }
+
+  void PointBased() {
+    const ObservableClasses classes = FindObservableClasses(pomdp_);
+    result_.classes = classes.classes.size();
+    PointBasedSearch search(pomdp_, classes, bounds_);
+    const auto account = [&] {
+      result_.trials = search.trials();
+      result_.expansions = search.expansions();
+      result_.value_lower = std::max(result_.value_lower, search.lower());
+      result_.value_upper = std::min(result_.value_upper, search.upper());
+    };
+    const auto why = search.Run(options_.precision, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+      account();
+      Row(false);
+      if (search.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      return Stop(expansions);
+    });
+    account();
+    result_.status = why.value_or(SolverStatus::kConverged);
+    const PointBasedPlan plan = search.Plan(false);
+    for (const auto& [c, v] : plan.vectors) {
+      const AlphaVector& vector = search.alphas(c)[v];
+      FullAlphaVector full{vector.action, {}, least_reward_ / (1.0 - pomdp_.discount)};
+      for (std::uint32_t i = 0; i < vector.values.size(); ++i) {
+        full.values.push_back({states_[classes.classes[c].states[i]], vector.values[i]});
+      }
+      result_.alphas.push_back(std::move(full));
+    }
+    result_.controller = plan.controller;
+    const PointBasedPlan relinked = search.Plan(true);
+    if (relinked.controller.nodes.size() * relinked.largest_class <= kEvaluatedUnknowns) Offer(relinked.controller);
+  }
+
+  /// Takes a controller if it is worth more than what is proven.
+  void Offer(const PomdpController& controller) {
+    const double give_up_s = GiveUp();
+    const auto value = EvaluateController(pomdp_, controller, [&] { return Wall() > give_up_s; });
+    if (!value || (result_.controller && value->value <= result_.value_lower)) return;
+    result_.controller = controller;
+    result_.value_lower = std::max(result_.value_lower, value->value);
+  }
+
+  double GiveUp() const { return Wall() + std::max(1.0, 0.05 * Wall()); }
+
+  /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
+  /// on blindly. Without discount that cannot be, nor that the policy is cut short for being too large: then there is
+  /// none.
+  template <class ActionOf>
+  std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of) {
+    const double give_up_s = GiveUp();
+    const BlindIncumbent blind(graph, bounds_);
+    PomdpController controller;
+    std::map<std::uint32_t, std::uint32_t> number;
+    std::vector<std::uint32_t> beliefs;
+    const auto of = [&](std::uint32_t b) {
+      const auto [found, added] = number.try_emplace(b, static_cast<std::uint32_t>(beliefs.size()));
+      if (added) beliefs.push_back(b);
+      return found->second;
+    };
+    of(graph.Start());
+    for (std::size_t i = 0; i < beliefs.size(); ++i) {
+      const bool cut = beliefs.size() > kControllerNodes || Wall() > give_up_s;
+      const int index = cut ? -1 : action_of(beliefs[i]);
+      PomdpController::Node node{0, {}, static_cast<std::uint32_t>(i)};
+      if (index < 0) {
+        if (pomdp_.discount == 1.0) return std::nullopt;
+        node.action = static_cast<std::uint32_t>(blind.Action(beliefs[i]));
+      } else {
+        const PomdpBeliefGraph::Action action = graph.Actions(beliefs[i])[static_cast<std::size_t>(index)];
+        node.action = action.action;
+        for (std::uint32_t k = 0; k < action.count; ++k) {
+          const PomdpBeliefGraph::Successor next = graph.Successors(action)[k];
+          node.branches.push_back({next.observation, of(next.belief)});
+        }
+      }
+      controller.nodes.push_back(std::move(node));
+    }
+    return controller;
+  }
+
+  /// Initial beliefs that are goals already.
+  bool Trivial(const PomdpBeliefGraph& graph) {
+    if (!graph.Trivial()) return false;
+    result_.value_lower = result_.value_upper = 0.0;
+    result_.controller = PomdpController{{{}}, 0};
+    return true;
+  }
+
+  void Certified() {
+    PomdpBeliefGraph graph(pomdp_, bounds_, 0);
+    if (Trivial(graph)) return;
+    BlindIncumbent incumbent(graph, bounds_);
+    const double least = std::max({graph.Heuristic(graph.Start()), options_.precision, 1e-9});
+    BoundedSearch search(graph, incumbent, 1.0 + 0.5 * options_.precision / least);
+    const auto account = [&](std::int64_t expansions) {
+      result_.trials = search.trials();
+      result_.expansions = expansions;
+      result_.value_lower = std::max(result_.value_lower, graph.to_goal() - search.Upper(graph.Start()));
+      result_.value_upper = std::min(result_.value_upper, graph.to_goal() - search.Lower(graph.Start()));
+    };
+    const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+      account(expansions);
+      Row(false);
+      if (result_.value_upper - result_.value_lower <= options_.precision) return SolverStatus::kConverged;
+      if (graph.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      return Stop(expansions);
+    });
+    account(search.expansions());
+    result_.beliefs = graph.size();
+    result_.status = why.value_or(SolverStatus::kConverged);
+    if (result_.value_lower == -kInfinity) return;
+    result_.controller = Freeze(graph, [&](std::uint32_t b) { return search.Improved(b) ? search.Action(b) : -1; });
+  }
+
+  void Rtdp() {
+    PomdpBeliefGraph graph(pomdp_, bounds_, options_.levels);
+    if (Trivial(graph)) return;
+    if (options_.kind == PomdpSolverKind::kERtdpBel && options_.experience != nullptr) {
+      const PomdpExperience experience(graph, *options_.experience, options_.epsilon, kExperienceBeliefs);
+      return RunRtdp(graph, [&](std::uint32_t b) { return experience(b); });
+    }
+    RunRtdp(graph, [&](std::uint32_t b) { return options_.epsilon * graph.Heuristic(b); });
+  }
+
+  template <class Initial>
+  void RunRtdp(PomdpBeliefGraph& graph, Initial initial) {
+    RtdpBel search(graph, initial, options_.seed);
+    const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+      result_.trials = search.trials();
+      result_.expansions = expansions;
+      Row(false);
+      if (graph.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      return Stop(expansions);
+    });
+    result_.status = why.value_or(SolverStatus::kConverged);
+    result_.trials = search.trials();
+    result_.expansions = search.expansions();
+    result_.beliefs = graph.size();
+    // The discretised model proves nothing: what its policy is worth is found by evaluating it on the POMDP itself.
+    const auto greedy = [&](std::uint32_t b) { return Greedy(graph, search, b); };
+    const std::optional<PomdpController> controller = Freeze(graph, greedy);
+    if (controller) Offer(*controller);
+    if (!result_.controller) result_.controller = controller;
+    if (options_.simulate > 0) {
+      BeliefAgent agent(pomdp_,
+                        [&](std::span<const SparseEntry> belief) { return LookAhead(graph, search, initial, belief); });
+      result_.simulated = SimulatePomdp(
+          pomdp_, agent, {.episodes = options_.simulate, .seed = options_.seed, .cancellation = options_.cancellation});
+    }
+  }
+
+  template <class Search>
+  static int Greedy(PomdpBeliefGraph& graph, Search& search, std::uint32_t b) {
+    if (search.Solved(b)) return search.Action(b);
+    int best = 0;
+    double least = kInfinity;
+    int index = 0;
+    for (const PomdpBeliefGraph::Action& action : graph.Actions(b)) {
+      double cost = action.cost;
+      graph.ForEachShare(action, [&](std::uint32_t next, double share) { cost += share * search.Value(next); });
+      if (cost < least) least = cost, best = index;
+      ++index;
+    }
+    return best;
+  }
+
+  /// RTDP-Bel's policy: greedy for the table, from the belief itself rather than from what stands for it.
+  template <class Search, class Initial>
+  std::uint32_t LookAhead(PomdpBeliefGraph& graph, Search& search, Initial& /*initial*/,
+                          std::span<const SparseEntry> belief) {
+    std::uint32_t best = 0;
+    double least = kInfinity;
+    BeliefUpdate update(pomdp_);
+    for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
+      double cost = graph.CostOf(belief, a);
+      update(belief, a, [&](std::uint32_t, double probability, const std::vector<SparseEntry>& next) {
+        const double share = probability * pomdp_.discount;
+        if (graph.IsGoal(next)) {
+          cost += share * graph.to_goal();
+          return;
+        }
+        const std::uint32_t known = graph.Find(next);
+        cost += share *
+                (known == PomdpBeliefGraph::kNone ? options_.epsilon * graph.HeuristicOf(next) : search.Value(known));
+      });
+      if (cost < least) least = cost, best = a;
+    }
+    return best;
+  }
+
+  const PomdpSolverOptions& options_;
+  std::chrono::steady_clock::time_point start_;
+  double cpu_start_s_ = 0.0;
+  std::vector<std::uint32_t> states_;  ///< of the whole model
+  Pomdp pomdp_;                        ///< what can be met of it
+  double least_reward_ = 0.0;
+  StateBounds bounds_;
+  PomdpResult result_;
+  double next_row_s_ = 0.0;
+};
+
+}  // namespace
+
+std::string_view ToString(PomdpSolverKind kind) {
+  switch (kind) {
+    case PomdpSolverKind::kPointBased: return "point-based";
+    case PomdpSolverKind::kCertified: return "certified";
+    case PomdpSolverKind::kRtdpBel: return "rtdp-bel";
+    case PomdpSolverKind::kERtdpBel: return "e-rtdp-bel";
+  }
+  return "?";
+}
+
+void Validate(const PomdpSolverOptions& options) {
+  const auto require = [](bool holds, const char* option, const char* what) {
+    if (!holds) throw InputError(option, what, "see feeler solve --help");
+  };
+  require(options.precision > 0.0 && std::isfinite(options.precision), "--precision", "must be above 0");
+  require(options.levels >= 0 && options.levels <= 1'000'000, "--levels", "must be 0 to 1000000");
+  require(options.epsilon >= 1.0 && std::isfinite(options.epsilon), "--epsilon", "must be at least 1");
+  require(options.time_limit_s > 0.0, "--time-limit", "must be above 0");
+  require(options.expansion_limit >= 1, "--expansion-limit", "must be at least 1");
+  require(options.simulate >= 0, "--simulate", "must be at least 0");
+}
+
+PomdpResult SolvePomdp(const Pomdp& pomdp, const PomdpSolverOptions& options) {
+  Validate(options);
+  RequireSolvable(pomdp);
+  if (options.kind == PomdpSolverKind::kPointBased && pomdp.discount == 1.0) {
+    throw InputError("--solver point-based", "the discount is 1", "take certified");
+  }
+  if (options.experience != nullptr) Validate(pomdp, *options.experience, "experience");
+  return Attempt(pomdp, options).Run();
+}
+
+}  // namespace feeler::planner

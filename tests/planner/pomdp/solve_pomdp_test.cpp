@@ -1,0 +1,243 @@
+// Laws of the solvers of general POMDPs:
+// - L <= V* <= U against an oracle that looks ahead through every history with the tables alone, and L and U meet as
+//   far as asked; the point-based and the certified solver agree;
+// - the controller that comes out is worth what is said, by the linear system and by simulation; evaluation agrees with
+//   a dense solve of the same system;
+// - bounds of states: blind <= V* <= informed <= QMDP;
+// - RTDP-Bel without discretisation solves what is small; with it its controller is worth no more than U;
+// - E-RTDP-Bel without experience is RTDP-Bel, and with a policy of the problem itself no worse;
+// - goal POMDPs cost what they must; those without a way to a goal are refused; same seed, same result.
+#include "feeler/planner/pomdp/search/solve_pomdp.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "feeler/core/error.h"
+#include "feeler/planner/pomdp/files/alpha_file.h"
+#include "feeler/planner/pomdp/model/rock_sample.h"
+#include "feeler/planner/pomdp/model/state_bounds.h"
+#include "tests/planner/pomdp/small_models.h"
+
+namespace feeler::planner {
+namespace {
+
+PomdpResult Solve(const Pomdp& pomdp, PomdpSolverKind kind, double precision = 1e-3) {
+  PomdpSolverOptions options;
+  options.kind = kind;
+  options.precision = precision;
+  options.time_limit_s = 20.0;
+  return SolvePomdp(pomdp, options);
+}
+
+/// The controller's linear system over all pairs of node and state, solved densely where it is small.
+double DenseValue(const Pomdp& pomdp, const PomdpController& controller) {
+  const std::size_t count = pomdp.state_count();
+  if (controller.nodes.size() * count > 1000) return EvaluateController(pomdp, controller)->value;
+  const auto size = static_cast<Eigen::Index>(controller.nodes.size() * count);
+  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(size, size);
+  Eigen::VectorXd r(size);
+  for (std::size_t n = 0; n < controller.nodes.size(); ++n) {
+    for (std::size_t s = 0; s < count; ++s) {
+      const auto row = static_cast<Eigen::Index>(n * count + s);
+      const std::size_t at = pomdp.At(controller.nodes[n].action, s);
+      r[row] = pomdp.reward[at];
+      for (const SparseEntry& next : pomdp.transitions.Row(at)) {
+        for (const SparseEntry& o : pomdp.observation_rows.Row(pomdp.At(controller.nodes[n].action, next.index))) {
+          const std::size_t to = controller.Next(static_cast<std::uint32_t>(n), o.index) * count + next.index;
+          a(row, static_cast<Eigen::Index>(to)) -= pomdp.discount * next.value * o.value;
+        }
+      }
+    }
+  }
+  const Eigen::VectorXd v = a.partialPivLu().solve(r);
+  double value = 0.0;
+  for (const SparseEntry& s : pomdp.start)
+    value += s.value * v[static_cast<Eigen::Index>(controller.root * count + s.index)];
+  return value;
+}
+
+class RandomModels : public testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(RandomModels, BoundsHoldAndMeet) {
+  const int states = 2 + static_cast<int>(GetParam() % 3);
+  const Pomdp pomdp = ParseCassandraPomdp(RandomModelText(GetParam(), states, 2, 2, 0.5), "random");
+  const Interval truth = LookAheadOracle(pomdp, 9);
+  const StateBounds bounds = ComputeStateBounds(pomdp);
+  EXPECT_LE(BestRow(bounds.blind, pomdp.start), truth.high);
+  EXPECT_GE(BestRow(bounds.informed, pomdp.start), truth.low);
+  EXPECT_LE(BestRow(bounds.informed, pomdp.start), BestRow(bounds.qmdp, pomdp.start) + 1e-12);
+  for (const PomdpSolverKind kind : {PomdpSolverKind::kPointBased, PomdpSolverKind::kCertified}) {
+    // A tree of exact beliefs closes later.
+    const double precision = kind == PomdpSolverKind::kPointBased ? 1e-3 : 0.02;
+    const PomdpResult result = Solve(pomdp, kind, precision);
+    EXPECT_EQ(result.status, SolverStatus::kConverged);
+    EXPECT_LE(result.value_upper - result.value_lower, precision + 1e-12);
+    EXPECT_LE(result.value_lower, truth.high + 1e-9) << ToString(kind);
+    EXPECT_GE(result.value_upper, truth.low - 1e-9) << ToString(kind);
+    ASSERT_TRUE(result.controller);
+    const double value = DenseValue(pomdp, *result.controller);
+    EXPECT_GE(value, result.value_lower - 1e-9) << ToString(kind);
+    EXPECT_LE(value, result.value_upper + 1e-9) << ToString(kind);
+    EXPECT_NEAR(EvaluateController(pomdp, *result.controller)->value, value, 1e-9);
+  }
+  // Without discretisation RTDP-Bel proves what it solves; with it the policy is worth at most V*.
+  for (const int levels : {0, 10}) {
+    PomdpSolverOptions options;
+    options.kind = PomdpSolverKind::kRtdpBel;
+    options.levels = levels;
+    options.expansion_limit = 300;
+    const PomdpResult result = SolvePomdp(pomdp, options);
+    EXPECT_LE(result.value_lower, truth.high + 1e-9);
+    EXPECT_GE(result.value_upper, truth.low - 1e-9);
+    if (result.controller) {
+      EXPECT_LE(DenseValue(pomdp, *result.controller), truth.high + 1e-9);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomModels, testing::Range<std::uint64_t>(1, 13));
+
+TEST(SolvePomdp, TigerIsCyclicAndWorthWhatThePapersSay) {
+  const Pomdp tiger = ParseCassandraPomdp(kTiger, "tiger");
+  for (const PomdpSolverKind kind :
+       {PomdpSolverKind::kPointBased, PomdpSolverKind::kCertified, PomdpSolverKind::kRtdpBel}) {
+    const PomdpResult result = Solve(tiger, kind);
+    EXPECT_NEAR(result.value_lower, 19.3713, 2e-3) << ToString(kind);
+    ASSERT_TRUE(result.controller);
+    EXPECT_LE(result.controller->nodes.size(), 20U);
+    EXPECT_NEAR(DenseValue(tiger, *result.controller), result.value_lower, 2e-3);
+  }
+}
+
+TEST(SolvePomdp, SimulationAgreesWithTheValue) {
+  const Pomdp pomdp = MakeRockSample(DrawRockSample(3, 3, 4));
+  const PomdpResult result = Solve(pomdp, PomdpSolverKind::kPointBased);
+  ASSERT_TRUE(result.controller);
+  ControllerAgent agent(*result.controller);
+  SimulationOptions options;
+  options.episodes = 4000;
+  const SimulationResult simulated = SimulatePomdp(pomdp, agent, options);
+  EXPECT_NEAR(simulated.mean, result.value_lower, 2.0 * simulated.half_width);
+  EXPECT_EQ(simulated.at_goal, 4000);
+  // The alpha vectors say the same, also written out and read back.
+  const auto alphas = ParseAlpha(FormatAlpha(pomdp, result.alphas), "alpha", pomdp);
+  const auto policyx = ParsePolicyx(FormatPolicyx(pomdp, result.alphas), "policyx", pomdp);
+  ASSERT_EQ(alphas.size(), result.alphas.size());
+  ASSERT_EQ(policyx.size(), result.alphas.size());
+  BeliefAgent by_vectors(pomdp, [&](std::span<const SparseEntry> belief) { return BestAction(policyx, belief); });
+  const SimulationResult again = SimulatePomdp(pomdp, by_vectors, options);
+  EXPECT_GE(again.mean, result.value_lower - 2.0 * again.half_width);
+  double best = -1e9;
+  for (const FullAlphaVector& alpha : alphas) {
+    double value = 0.0;
+    for (const SparseEntry& s : pomdp.start) value += s.value * alpha.values[s.index].value;
+    best = std::max(best, value);
+  }
+  EXPECT_LE(best, result.value_upper + 1e-9);
+  EXPECT_GE(best, result.value_lower - 1e-3);
+}
+
+TEST(SolvePomdp, RockSampleIsTheDescriptionsModel) {
+  RockSample problem;
+  problem.size = 2;
+  problem.rocks = {{1, 0}};
+  problem.start = {0, 0};
+  const Pomdp p = MakeRockSample(problem);
+  EXPECT_EQ(p.state_count(), 9U);
+  EXPECT_EQ(p.action_count(), 6U);
+  // East to the rock, check it where the sensor is certain, sample if good, east: against leaving at once.
+  const double g = 0.95;
+  const double sampled = g * g * 0.5 * (10.0 + g * 10.0) + g * g * 0.5 * 10.0;
+  const double blind = g * 0.0 + g * g * 10.0;  // sampling unseen earns nothing on average, and delays
+  const PomdpResult result = Solve(p, PomdpSolverKind::kPointBased, 1e-6);
+  EXPECT_NEAR(result.value_lower, std::max({sampled, g * 10.0, blind}), 1e-5);
+}
+
+TEST(SolvePomdp, GoalProblems) {
+  // One of two doors is right; asking costs 1 and is right in 80 %; a wrong door costs 20 and ends it, too.
+  const std::string text =
+      "discount: 1.0\nvalues: cost\nstates: left right done\nactions: ask go-left go-right\nobservations: l r\nstart: "
+      "0.5 0.5 0.0\n"
+      "T: ask identity\nT: go-left : * : done 1.0\nT: go-right : * : done 1.0\n"
+      "O: * uniform\nO: ask : left\n0.8 0.2\nO: ask : right\n0.2 0.8\n"
+      "R: ask : left : * : * 1\nR: ask : right : * : * 1\nR: go-left : right : * : * 20\nR: go-right : left : * : * "
+      "20\n";
+  const Pomdp pomdp = ParseCassandraPomdp(text, "doors");
+  // The belief is a walk on the difference d of answers, the odds 4^d: stop at |d| = n, the best n by the ruin formula.
+  double least = 10.0;
+  for (int n = 1; n < 10; ++n) {
+    const double wrong = 1.0 / (1.0 + std::pow(4.0, n));
+    const double steps = n / 0.6 * (1.0 - 2.0 * wrong);
+    least = std::min(least, steps + 20.0 * wrong);
+  }
+  const PomdpResult result = Solve(pomdp, PomdpSolverKind::kCertified, 1e-4);
+  EXPECT_NEAR(result.value_lower, -least, 1e-3);
+  EXPECT_LE(result.value_lower, -least + 1e-9);
+  EXPECT_GE(result.value_upper, -least - 1e-9);
+  ASSERT_TRUE(result.controller);
+  EXPECT_NEAR(EvaluateController(pomdp, *result.controller)->value, -least, 1e-3);
+  EXPECT_THROW(Solve(pomdp, PomdpSolverKind::kPointBased), InputError);
+}
+
+TEST(SolvePomdp, NoWayToAGoalIsSaid) {
+  const std::string text =
+      "discount: 1.0\nvalues: cost\nstates: here trap done\nactions: go\nobservations: o\nstart: here\n"
+      "T: go : here : trap 0.5\nT: go : here : done 0.5\nT: go : trap : trap 1.0\nT: go : done : done 1.0\nO: * "
+      "uniform\n"
+      "R: go : here : * : * 1\nR: go : trap : * : * 1\n";
+  EXPECT_THROW(Solve(ParseCassandraPomdp(text, "trap"), PomdpSolverKind::kCertified), NegativeResult);
+}
+
+TEST(SolvePomdp, ExperienceOfTheProblemItself) {
+  const Pomdp pomdp = MakeRockSample(DrawRockSample(3, 2, 2));
+  const PomdpResult plain = Solve(pomdp, PomdpSolverKind::kRtdpBel);
+  const PomdpResult none = Solve(pomdp, PomdpSolverKind::kERtdpBel);
+  EXPECT_EQ(plain.value_lower, none.value_lower);
+  EXPECT_EQ(plain.expansions, none.expansions);
+  const PomdpResult best = Solve(pomdp, PomdpSolverKind::kPointBased);
+  PomdpSolverOptions options;
+  options.kind = PomdpSolverKind::kERtdpBel;
+  options.experience = &*best.controller;
+  options.epsilon = 1.5;
+  const PomdpResult with = SolvePomdp(pomdp, options);
+  options.experience = nullptr;
+  const PomdpResult without = SolvePomdp(pomdp, options);
+  EXPECT_GE(with.value_lower, without.value_lower - 1e-9);
+}
+
+TEST(SolvePomdp, SameSeedSameResult) {
+  const Pomdp pomdp = MakeRockSample(DrawRockSample(4, 3, 1));
+  for (const PomdpSolverKind kind :
+       {PomdpSolverKind::kPointBased, PomdpSolverKind::kCertified, PomdpSolverKind::kRtdpBel}) {
+    PomdpSolverOptions options;
+    options.kind = kind;
+    options.expansion_limit = 300;
+    const PomdpResult a = SolvePomdp(pomdp, options);
+    const PomdpResult b = SolvePomdp(pomdp, options);
+    EXPECT_EQ(a.value_lower, b.value_lower);
+    EXPECT_EQ(a.value_upper, b.value_upper);
+    EXPECT_EQ(a.expansions, b.expansions);
+  }
+}
+
+TEST(SolvePomdp, LimitsStopIt) {
+  const Pomdp pomdp = MakeRockSample(DrawRockSample(5, 5, 1));
+  PomdpSolverOptions options;
+  options.expansion_limit = 50;
+  EXPECT_EQ(SolvePomdp(pomdp, options).status, SolverStatus::kExpansionLimit);
+  options = {};
+  options.memory_limit_bytes = 1 << 20;
+  const PomdpResult result = SolvePomdp(pomdp, options);
+  EXPECT_EQ(result.status, SolverStatus::kMemoryLimit);
+  EXPECT_LE(result.value_lower, result.value_upper);
+  CancellationToken token;
+  token.Cancel();
+  options = {};
+  options.cancellation = &token;
+  EXPECT_EQ(SolvePomdp(pomdp, options).status, SolverStatus::kCancelled);
+}
+
+}  // namespace
+}  // namespace feeler::planner
