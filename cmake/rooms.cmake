@@ -79,6 +79,7 @@ endfunction()
 # `tests`.
 function(feeler_tests room)  # the tests of `cli` run the binary
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${room}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/tests/cad/kinds/")  # feeler_part_shapes
   if(NOT sources)
     return()
   endif()
