@@ -8,7 +8,6 @@
 namespace feeler::cad {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kSameDirection = 0.99996;  // cosine of half a degree
 constexpr std::size_t kMostNormals = 8;
 constexpr double kLeastShare = 0.02;  ///< of the surface, for a normal to count
@@ -19,11 +18,13 @@ void Dominant(Feature& feature) {
   constexpr int kBins = 360;
   std::array<double, kBins> length{};
   double perimeter = 0;
-  const auto bin_of = [](double angle) { return static_cast<int>(std::floor(angle / kPi * kBins)) % kBins; };
+  const auto bin_of = [](double angle) {
+    return static_cast<int>(std::floor(angle / std::numbers::pi * kBins)) % kBins;
+  };
   const auto angle_of = [](const Eigen::Vector2d& e) {
     const double angle = std::atan2(e.y(), e.x());
-    const double folded = angle < 0 ? angle + kPi : angle;
-    return folded >= kPi - 1e-9 ? 0.0 : folded;
+    const double folded = angle < 0 ? angle + std::numbers::pi : angle;
+    return folded >= std::numbers::pi - 1e-9 ? 0.0 : folded;
   };
   const std::size_t count = feature.loop.size();
   for (std::size_t i = 0; i < count; ++i) {

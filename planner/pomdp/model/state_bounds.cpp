@@ -7,7 +7,7 @@
 namespace feeler::planner {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 using Rows = std::vector<std::vector<double>>;
 
@@ -25,7 +25,7 @@ class Sweeper {
     const std::size_t actions = pomdp_.action_count();
     // Above every value: the best reward for ever; nothing is above 0 in goal POMDPs.
     const double above = pomdp_.discount < 1.0 ? most_ / (1.0 - pomdp_.discount) : 0.0;
-    const double below = pomdp_.discount < 1.0 ? least_ / (1.0 - pomdp_.discount) : -kInfinity;
+    const double below = pomdp_.discount < 1.0 ? least_ / (1.0 - pomdp_.discount) : -kNoBound;
     scale_ = std::max({1e-9, std::abs(above), std::isfinite(below) ? std::abs(below) : std::abs(least_)});
 
     StateBounds bounds;
@@ -62,7 +62,7 @@ class Sweeper {
   double SweepMdp(std::vector<double>& best, Rows& q) const {
     double change = 0.0;
     for (std::size_t s = 0; s < best.size(); ++s) {
-      double most = -kInfinity;
+      double most = -kNoBound;
       for (std::size_t a = 0; a < q.size(); ++a) most = std::max(most, q[a][s] = std::min(q[a][s], Backup(a, s, best)));
       change = std::max(change, best[s] - most);
       best[s] = std::min(best[s], most);
@@ -113,7 +113,7 @@ class Sweeper {
 
   const Pomdp& pomdp_;
   const StateBoundsOptions& options_;
-  double least_ = 0.0, most_ = -kInfinity;
+  double least_ = 0.0, most_ = -kNoBound;
   double scale_ = 1.0;
   std::vector<double> sums_;
 };
@@ -125,7 +125,7 @@ StateBounds ComputeStateBounds(const Pomdp& pomdp, const StateBoundsOptions& opt
 }
 
 double BestRow(const std::vector<std::vector<double>>& rows, std::span<const SparseEntry> belief) {
-  double best = -kInfinity;
+  double best = -kNoBound;
   for (const std::vector<double>& row : rows) {
     double sum = 0.0;
     for (const SparseEntry& s : belief) sum += s.value * row[s.index];

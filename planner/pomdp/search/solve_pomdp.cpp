@@ -19,7 +19,7 @@
 namespace feeler::planner {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 /// Controllers with more unknowns than this are not evaluated for a better value than the one that is proven already.
 constexpr std::size_t kEvaluatedUnknowns = 400'000;
 /// Beliefs of a controller written out of a search, at most.
@@ -34,7 +34,7 @@ class BlindIncumbent {
   double Value(std::uint32_t b) const { return graph_.to_goal() - BestRow(bounds_.blind, graph_.Belief(b)); }
   int Action(std::uint32_t b) const {
     int best = 0;
-    double most = -kInfinity;
+    double most = -kUnbounded;
     for (std::size_t a = 0; a < bounds_.blind.size(); ++a) {
       double value = 0.0;
       for (const SparseEntry& s : graph_.Belief(b)) value += s.value * bounds_.blind[a][s.index];
@@ -237,7 +237,7 @@ class Attempt {
     account(search.expansions());
     result_.beliefs = graph.size();
     result_.status = why.value_or(SolverStatus::kConverged);
-    if (result_.value_lower == -kInfinity) return;
+    if (result_.value_lower == -kUnbounded) return;
     result_.controller = Freeze(graph, [&](std::uint32_t b) { return search.Improved(b) ? search.Action(b) : -1; });
   }
 
@@ -282,7 +282,7 @@ class Attempt {
   static int Greedy(PomdpBeliefGraph& graph, Search& search, std::uint32_t b) {
     if (search.Solved(b)) return search.Action(b);
     int best = 0;
-    double least = kInfinity;
+    double least = kUnbounded;
     int index = 0;
     for (const PomdpBeliefGraph::Action& action : graph.Actions(b)) {
       double cost = action.cost;
@@ -298,7 +298,7 @@ class Attempt {
   std::uint32_t LookAhead(PomdpBeliefGraph& graph, Search& search, Initial& /*initial*/,
                           std::span<const SparseEntry> belief) {
     std::uint32_t best = 0;
-    double least = kInfinity;
+    double least = kUnbounded;
     BeliefUpdate update(pomdp_);
     for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
       double cost = graph.CostOf(belief, a);
