@@ -1,0 +1,234 @@
+#include "feeler/cad/measure/deviation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "feeler/cad/measure/sliding.h"
+#include "feeler/cad/pieces/clip.h"
+#include "feeler/core/random.h"
+
+namespace feeler::cad {
+namespace {
+
+/// What must be cut up further than this has a bound that is good enough.
+constexpr int kMostPatches = 400'000;
+
+struct Patch {
+  std::array<Eigen::Vector3d, 3> corners;
+  double bound = 0.0;
+  bool operator<(const Patch& other) const { return bound < other.bound; }
+};
+
+struct Best {
+  double value = 0.0;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  void Offer(double v, const Eigen::Vector3d& p) {
+    if (v > value) {
+      value = v;
+      at = p;
+    }
+  }
+};
+
+std::array<std::array<Eigen::Vector3d, 3>, 2> Halves(const std::array<Eigen::Vector3d, 3>& t) {
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < 3; ++k) {
+    if ((t[(k + 1) % 3] - t[k]).squaredNorm() > (t[(longest + 1) % 3] - t[longest]).squaredNorm()) longest = k;
+  }
+  const Eigen::Vector3d& a = t[longest];
+  const Eigen::Vector3d& b = t[(longest + 1) % 3];
+  const Eigen::Vector3d& c = t[(longest + 2) % 3];
+  const Eigen::Vector3d middle = 0.5 * (a + b);
+  return {{{a, middle, c}, {middle, b, c}}};
+}
+
+/// Whether some triangle of the part cuts the patch.
+bool SurfaceCuts(const MeshTree& part, const std::array<Eigen::Vector3d, 3>& patch) {
+  Box box(patch[0]);
+  box.extend(patch[1]);
+  box.extend(patch[2]);
+  bool cuts = false;
+  part.Visit(box, [&](int t) {
+    const TriangleMesh& mesh = part.mesh();
+    cuts = TrianglesCut(patch, {mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)});
+    return !cuts;
+  });
+  return cuts;
+}
+
+/// A face of a piece, moved inward by `depth_m` and away from the other faces by as much: so that a face that lies on the
+/// surface of the part, or ends at it, does not cut it.
+Polygon3 Shrunk(const ConvexPiece& piece, int triangle, double depth_m) {
+  const Eigen::Vector3d area = AreaVector(piece.surface, triangle);
+  if (area.norm() < 1e-16) return {};
+  const Eigen::Vector3d inward = -area.normalized();
+  Polygon3 polygon;
+  for (int k = 0; k < 3; ++k) polygon.emplace_back(piece.surface.Corner(triangle, k) + depth_m * inward);
+  Polygon3 shrunk = polygon;
+  for (const HalfSpace& plane : piece.planes) {
+    if (plane.normal.dot(inward) < -1 + 1e-9) continue;  // its own
+    shrunk = Clip(shrunk, plane.normal, plane.offset_m - depth_m);
+  }
+  return shrunk.empty() ? polygon : shrunk;
+}
+
+/// The farthest that the faces of the pieces stand out of the part.
+Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone, double accuracy_m) {
+  Best best;
+  std::priority_queue<Patch> queue;
+  const auto judge = [&](Patch patch) {
+    const Eigen::Vector3d center = (patch.corners[0] + patch.corners[1] + patch.corners[2]) / 3;
+    double radius = 0;
+    for (const Eigen::Vector3d& corner : patch.corners) radius = std::max(radius, (corner - center).norm());
+    const bool inside = part.Inside(center);
+    if (inside && !SurfaceCuts(part, patch.corners)) return;
+    const double here = inside ? 0.0 : part.Distance(center);
+    best.Offer(here, center);
+    patch.bound = here + radius;
+    if (patch.bound > best.value + accuracy_m) queue.push(patch);
+  };
+  for (const ConvexPiece& piece : pieces) {
+    for (int t = 0; t < piece.surface.size(); ++t) {
+      Polygon3 polygon = Shrunk(piece, t, accuracy_m);
+      if (zone) polygon = ClipToBox(std::move(polygon), *zone);
+      for (std::size_t k = 1; k + 1 < polygon.size(); ++k) judge({{polygon[0], polygon[k], polygon[k + 1]}, 0});
+    }
+  }
+  for (int cut = 0; cut < kMostPatches && !queue.empty(); ++cut) {
+    const Patch patch = queue.top();
+    queue.pop();
+    if (patch.bound <= best.value + accuracy_m) break;
+    for (const auto& half : Halves(patch.corners)) judge({half, 0});
+  }
+  if (!queue.empty() && queue.top().bound > best.value + accuracy_m) best.value = queue.top().bound;
+  if (best.value > 0) best.value += accuracy_m;
+  return best;
+}
+
+double DistanceToUnion(const std::vector<const ConvexPiece*>& pieces, const Eigen::Vector3d& p) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const ConvexPiece* piece : pieces) {
+    if (piece->bounds.squaredExteriorDistance(p) >= best * best) continue;
+    best = std::min(best, DistanceTo(*piece, p));
+  }
+  return best;
+}
+
+/// What pieces, grown by `grow_m`, leave uncovered of a triangle.
+std::vector<Polygon3> Uncovered(const Polygon3& triangle, const std::vector<ConvexPiece>& pieces, double grow_m) {
+  Box box;
+  for (const Eigen::Vector3d& p : triangle) box.extend(p);
+  const Box grown(box.min().array() - 2 * grow_m, box.max().array() + 2 * grow_m);
+  std::vector<Polygon3> rest{triangle};
+  for (const ConvexPiece& piece : pieces) {
+    if (!piece.bounds.intersects(grown)) continue;
+    std::vector<Polygon3> next;
+    for (const Polygon3& polygon : rest) {
+      for (Polygon3& outside : Outside(polygon, piece, grow_m)) next.push_back(std::move(outside));
+    }
+    rest = std::move(next);
+    if (rest.empty()) break;
+  }
+  return rest;
+}
+
+/// The farthest that the part's surface is from the pieces. The distance to a convex piece is a convex function, so that on
+/// a patch the largest distance to the union is at most the smallest, over the pieces, of the largest at its corners.
+Best Lost(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone, double accuracy_m) {
+  Best best;
+  std::priority_queue<Patch> queue;
+  std::vector<const ConvexPiece*> all;
+  for (const ConvexPiece& piece : pieces) all.push_back(&piece);
+  const auto judge = [&](Patch patch) {
+    double radius = 0;
+    const Eigen::Vector3d center = (patch.corners[0] + patch.corners[1] + patch.corners[2]) / 3;
+    for (const Eigen::Vector3d& corner : patch.corners) {
+      best.Offer(DistanceToUnion(all, corner), corner);
+      radius = std::max(radius, (corner - center).norm());
+    }
+    const double here = DistanceToUnion(all, center);
+    best.Offer(here, center);
+    patch.bound = here + radius;
+    for (const ConvexPiece* piece : all) {
+      if (piece->bounds.squaredExteriorDistance(center) > patch.bound * patch.bound) continue;
+      double worst = 0;
+      for (const Eigen::Vector3d& corner : patch.corners) worst = std::max(worst, DistanceTo(*piece, corner));
+      patch.bound = std::min(patch.bound, worst);
+    }
+    if (patch.bound > best.value + accuracy_m) queue.push(patch);
+  };
+  const TriangleMesh& mesh = part.mesh();
+  for (int t = 0; t < mesh.size(); ++t) {
+    Polygon3 triangle{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
+    if (zone) triangle = ClipToBox(std::move(triangle), *zone);
+    if (triangle.size() < 3) continue;
+    for (const Polygon3& rest : Uncovered(triangle, pieces, accuracy_m)) {
+      for (std::size_t k = 1; k + 1 < rest.size(); ++k) judge({{rest[0], rest[k], rest[k + 1]}, 0});
+    }
+  }
+  for (int cut = 0; cut < kMostPatches && !queue.empty(); ++cut) {
+    const Patch patch = queue.top();
+    queue.pop();
+    if (patch.bound <= best.value + accuracy_m) break;
+    for (const auto& half : Halves(patch.corners)) judge({half, 0});
+  }
+  if (!queue.empty() && queue.top().bound > best.value + accuracy_m) best.value = queue.top().bound;
+  return best;
+}
+
+/// Points drawn evenly on a surface.
+template <class Visit>
+void Sample(const TriangleMesh& mesh, int points, RandomStream& random, const Visit& visit) {
+  std::vector<double> sums;
+  double sum = 0;
+  for (int t = 0; t < mesh.size(); ++t) sums.push_back(sum += AreaVector(mesh, t).norm());
+  for (int i = 0; i < points; ++i) {
+    const auto at = std::upper_bound(sums.begin(), sums.end(), random.Uniform(0.0, sum));
+    const int t = static_cast<int>(std::min<std::ptrdiff_t>(at - sums.begin(), mesh.size() - 1));
+    double u = random.Uniform(0.0, 1.0);
+    double v = random.Uniform(0.0, 1.0);
+    if (u + v > 1) {
+      u = 1 - u;
+      v = 1 - v;
+    }
+    const Eigen::Vector3d& a = mesh.Corner(t, 0);
+    visit(Eigen::Vector3d(a + u * (mesh.Corner(t, 1) - a) + v * (mesh.Corner(t, 2) - a)));
+  }
+}
+
+}  // namespace
+
+Deviation DeviationOf(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
+                      double accuracy_m) {
+  const Best added = Added(part, pieces, zone, accuracy_m);
+  const Best lost = Lost(part, pieces, zone, accuracy_m);
+  return {added.value, added.at, lost.value, lost.at};
+}
+
+Deviation SampledDeviation(const MeshTree& part, const std::vector<ConvexPiece>& pieces, int points, std::uint64_t seed,
+                           const std::optional<Box>& zone) {
+  Best added;
+  Best lost;
+  TriangleMesh faces;
+  for (const ConvexPiece& piece : pieces) Append(piece.surface, faces);
+  const MeshTree tree(faces);
+  RandomStream random(seed, 0, "cad deviation");
+  const auto counts = [&](const Eigen::Vector3d& p) { return !zone || zone->contains(p); };
+  Sample(faces, points / 2, random, [&](const Eigen::Vector3d& p) {
+    if (counts(p)) added.Offer(part.DistanceToSolid(p), p);
+  });
+  Sample(part.mesh(), points - points / 2, random, [&](const Eigen::Vector3d& p) {
+    if (!counts(p)) return;
+    const bool within = std::any_of(pieces.begin(), pieces.end(), [&](const ConvexPiece& piece) {
+      return std::all_of(piece.planes.begin(), piece.planes.end(),
+                         [&](const HalfSpace& plane) { return plane.normal.dot(p) <= plane.offset_m; });
+    });
+    if (!within) lost.Offer(tree.Distance(p), p);
+  });
+  return {added.value, added.at, lost.value, lost.at};
+}
+
+}  // namespace feeler::cad

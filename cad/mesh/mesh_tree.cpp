@@ -1,0 +1,179 @@
+#include "feeler/cad/mesh/mesh_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace feeler::cad {
+namespace {
+
+constexpr int kLeafSize = 6;
+
+double SquaredDistance(const Box& box, const Eigen::Vector3d& p) { return box.squaredExteriorDistance(p); }
+
+/// Whether the ray from `p` along `d` meets the box (slabs).
+bool RayMeets(const Box& box, const Eigen::Vector3d& p, const Eigen::Vector3d& inverse) {
+  double low = 0;
+  double high = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const double a = (box.min()[k] - p[k]) * inverse[k];
+    const double b = (box.max()[k] - p[k]) * inverse[k];
+    low = std::max(low, std::min(a, b));
+    high = std::min(high, std::max(a, b));
+  }
+  return low <= high;
+}
+
+}  // namespace
+
+Eigen::Vector3d ClosestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                  const Eigen::Vector3d& c) {
+  const Eigen::Vector3d ab = b - a;
+  const Eigen::Vector3d ac = c - a;
+  const Eigen::Vector3d ap = p - a;
+  const double d1 = ab.dot(ap);
+  const double d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const Eigen::Vector3d bp = p - b;
+  const double d3 = ab.dot(bp);
+  const double d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return b;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + ab * (d1 / (d1 - d3));
+  const Eigen::Vector3d cp = p - c;
+  const double d5 = ab.dot(cp);
+  const double d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return c;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + ac * (d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+  const double sum = va + vb + vc;
+  if (sum == 0) return a;
+  return a + ab * (vb / sum) + ac * (vc / sum);
+}
+
+MeshTree::MeshTree(const TriangleMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
+  std::iota(order_.begin(), order_.end(), 0);
+  centers_.reserve(order_.size());
+  for (int t = 0; t < mesh.size(); ++t) centers_.push_back(BoundsOf(mesh, t).center());
+  nodes_.reserve(order_.size());
+  if (!order_.empty()) Build(0, static_cast<int>(order_.size()));
+}
+
+int MeshTree::Build(int first, int count) {
+  const int number = static_cast<int>(nodes_.size());
+  nodes_.emplace_back();
+  Box box;
+  Box centers;
+  for (int i = first; i < first + count; ++i) {
+    const int t = order_[static_cast<std::size_t>(i)];
+    box.extend(BoundsOf(mesh_, t));
+    centers.extend(centers_[static_cast<std::size_t>(t)]);
+  }
+  Node node{box, first, count, 0};
+  if (count > kLeafSize) {
+    int axis = 0;
+    centers.sizes().maxCoeff(&axis);
+    const auto begin = order_.begin() + first;
+    const int half = count / 2;
+    std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
+      const double x = centers_[static_cast<std::size_t>(a)][axis];
+      const double y = centers_[static_cast<std::size_t>(b)][axis];
+      return x != y ? x < y : a < b;
+    });
+    node.count = 0;
+    node.first = Build(first, half);
+    node.second = Build(first + half, count - half);
+  }
+  nodes_[static_cast<std::size_t>(number)] = node;
+  return number;
+}
+
+double MeshTree::Distance(const Eigen::Vector3d& p) const {
+  double best = std::numeric_limits<double>::infinity();
+  std::vector<int> stack;
+  if (!nodes_.empty()) stack.push_back(0);
+  while (!stack.empty()) {
+    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
+    stack.pop_back();
+    if (SquaredDistance(node.box, p) >= best) continue;
+    if (node.count > 0) {
+      for (int i = node.first; i < node.first + node.count; ++i) {
+        const int t = order_[static_cast<std::size_t>(i)];
+        const Eigen::Vector3d q = ClosestOnTriangle(p, mesh_.Corner(t, 0), mesh_.Corner(t, 1), mesh_.Corner(t, 2));
+        best = std::min(best, (p - q).squaredNorm());
+      }
+      continue;
+    }
+    const double first = SquaredDistance(nodes_[static_cast<std::size_t>(node.first)].box, p);
+    const double second = SquaredDistance(nodes_[static_cast<std::size_t>(node.second)].box, p);
+    // The nearer child last, so that it is looked at first.
+    stack.push_back(first < second ? node.second : node.first);
+    stack.push_back(first < second ? node.first : node.second);
+  }
+  return std::sqrt(best);
+}
+
+int MeshTree::Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const {
+  const Eigen::Vector3d inverse = direction.cwiseInverse();
+  int sum = 0;
+  std::vector<int> stack;
+  if (!nodes_.empty()) stack.push_back(0);
+  while (!stack.empty()) {
+    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
+    stack.pop_back();
+    if (!RayMeets(node.box, p, inverse)) continue;
+    if (node.count == 0) {
+      stack.push_back(node.first);
+      stack.push_back(node.second);
+      continue;
+    }
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const int t = order_[static_cast<std::size_t>(i)];
+      const Eigen::Vector3d a = mesh_.Corner(t, 0) - p;
+      const Eigen::Vector3d b = mesh_.Corner(t, 1) - p;
+      const Eigen::Vector3d c = mesh_.Corner(t, 2) - p;
+      const double u = direction.dot(b.cross(c));
+      const double v = direction.dot(c.cross(a));
+      const double w = direction.dot(a.cross(b));
+      const bool outward = u > 0 && v > 0 && w > 0;
+      const bool inward = u < 0 && v < 0 && w < 0;
+      if (!outward && !inward) continue;
+      if (a.dot((b - a).cross(c - a)) * (outward ? 1 : -1) > 0) sum += outward ? 1 : -1;
+    }
+  }
+  return sum;
+}
+
+bool MeshTree::Inside(const Eigen::Vector3d& p) const {
+  if (nodes_.empty() || nodes_.front().box.squaredExteriorDistance(p) > 0) return false;
+  static const std::array<Eigen::Vector3d, 3> kDirections = {Eigen::Vector3d(0.4136718, 0.6370233, 0.6504911),
+                                                             Eigen::Vector3d(-0.7213402, 0.3091177, 0.6197771),
+                                                             Eigen::Vector3d(0.2271903, -0.8534107, -0.4690123)};
+  int votes = 0;
+  for (const Eigen::Vector3d& direction : kDirections) votes += Crossings(p, direction) > 0 ? 1 : 0;
+  return votes >= 2;
+}
+
+void MeshTree::Visit(const Box& box, const std::function<bool(int)>& visit) const {
+  std::vector<int> stack;
+  if (!nodes_.empty()) stack.push_back(0);
+  while (!stack.empty()) {
+    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
+    stack.pop_back();
+    if (!node.box.intersects(box)) continue;
+    if (node.count == 0) {
+      stack.push_back(node.second);
+      stack.push_back(node.first);
+      continue;
+    }
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const int t = order_[static_cast<std::size_t>(i)];
+      if (BoundsOf(mesh_, t).intersects(box) && !visit(t)) return;
+    }
+  }
+}
+
+}  // namespace feeler::cad

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "feeler/cad/mesh/triangle_mesh.h"
+
+namespace feeler::cad {
+
+/// The point of a triangle that is nearest to `p` (Ericson 2005, section 5.1.5).
+Eigen::Vector3d ClosestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                                  const Eigen::Vector3d& c);
+
+/// A tree of boxes over the triangles of a mesh, which must outlive it. Immutable; shared by threads.
+class MeshTree {
+ public:
+  explicit MeshTree(const TriangleMesh& mesh);
+
+  /// Distance from `p` to the surface, m.
+  double Distance(const Eigen::Vector3d& p) const;
+  /// Whether `p` is inside: a ray crosses the surface outward more often than inward; of three skew rays the majority
+  /// decides. Cracks of no width, as where a long edge meets two short ones, do no harm.
+  bool Inside(const Eigen::Vector3d& p) const;
+  /// 0 inside, else the distance to the surface.
+  double DistanceToSolid(const Eigen::Vector3d& p) const { return Inside(p) ? 0.0 : Distance(p); }
+  /// Calls `visit` for each triangle whose box meets `box`, until it returns false.
+  void Visit(const Box& box, const std::function<bool(int)>& visit) const;
+
+  const TriangleMesh& mesh() const { return mesh_; }
+
+ private:
+  struct Node {
+    Box box;
+    int first = 0;  ///< of its triangles in order_, for a leaf; else the number of its first child
+    int count = 0;  ///< 0: an inner node, whose second child follows the first one's subtree
+    int second = 0;
+  };
+  int Build(int first, int count);
+  int Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const;
+
+  const TriangleMesh& mesh_;
+  std::vector<int> order_;
+  std::vector<Eigen::Vector3d> centers_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace feeler::cad

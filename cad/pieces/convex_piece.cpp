@@ -1,0 +1,127 @@
+#include "feeler/cad/pieces/convex_piece.h"
+
+extern "C" {
+#include <libqhull_r/qhull_ra.h>
+}
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <memory>
+
+#include "feeler/cad/mesh/mesh_tree.h"
+
+namespace feeler::cad {
+namespace {
+
+/// Qhull's tolerances suit numbers about 1.
+constexpr double kScale = 1e3;
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+
+/// Facets of the hull as triples of input points, and their planes (unscaled); false when the points are flat.
+bool RunQhull(std::vector<double>& coordinates, std::vector<std::array<int, 3>>& triangles, std::vector<HalfSpace>& planes) {
+  const std::unique_ptr<std::FILE, CloseFile> silence(std::fopen("/dev/null", "w"));
+  qhT context;
+  qhT* qh = &context;
+  qh_zero(qh, silence.get());
+  char options[] = "qhull Qt Pp";
+  const int count = static_cast<int>(coordinates.size() / 3);
+  const int error = qh_new_qhull(qh, 3, count, coordinates.data(), False, options, nullptr, silence.get());
+  if (error == 0) {
+    facetT* facet = nullptr;
+    FORALLfacets {
+      std::array<int, 3> corners{};
+      std::size_t k = 0;
+      vertexT* vertex = nullptr;
+      vertexT** vertexp = nullptr;
+      FOREACHvertex_(facet->vertices) {
+        if (k < 3) corners[k++] = qh_pointid(qh, vertex->point);
+      }
+      if (facet->toporient ^ qh_ORIENTclock) std::swap(corners[0], corners[1]);
+      triangles.push_back(corners);
+      planes.push_back({{facet->normal[0], facet->normal[1], facet->normal[2]}, -facet->offset / kScale});
+    }
+  }
+  qh_freeqhull(qh, !qh_ALL);
+  int current = 0;
+  int total = 0;
+  qh_memfreeshort(qh, &current, &total);
+  return error == 0;
+}
+
+/// One plane for each direction.
+std::vector<HalfSpace> Distinct(const std::vector<HalfSpace>& planes) {
+  std::vector<HalfSpace> distinct;
+  for (const HalfSpace& plane : planes) {
+    bool known = false;
+    for (HalfSpace& other : distinct) {
+      if ((other.normal - plane.normal).squaredNorm() > 1e-18 || std::abs(other.offset_m - plane.offset_m) > 1e-9) continue;
+      other.offset_m = std::max(other.offset_m, plane.offset_m);
+      known = true;
+      break;
+    }
+    if (!known) distinct.push_back(plane);
+  }
+  return distinct;
+}
+
+}  // namespace
+
+std::optional<ConvexPiece> HullOf(const std::vector<Eigen::Vector3d>& points) {
+  if (points.size() < 4) return std::nullopt;
+  Box box;
+  for (const Eigen::Vector3d& p : points) box.extend(p);
+  if (box.sizes().minCoeff() < 1e-7) return std::nullopt;
+  const Eigen::Vector3d center = box.center();
+  std::vector<double> coordinates;
+  coordinates.reserve(3 * points.size());
+  for (const Eigen::Vector3d& p : points) {
+    for (int k = 0; k < 3; ++k) coordinates.push_back((p[k] - center[k]) * kScale);
+  }
+  std::vector<std::array<int, 3>> triangles;
+  ConvexPiece piece;
+  std::vector<HalfSpace> planes;
+  if (!RunQhull(coordinates, triangles, planes)) return std::nullopt;
+  for (HalfSpace& plane : planes) plane.offset_m += plane.normal.dot(center);
+  piece.planes = Distinct(planes);
+  std::vector<int> number(points.size(), -1);
+  for (const auto& t : triangles) {
+    std::array<int, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      int& known = number[static_cast<std::size_t>(t[k])];
+      if (known < 0) {
+        known = static_cast<int>(piece.surface.points.size());
+        piece.surface.points.push_back(points[static_cast<std::size_t>(t[k])]);
+      }
+      corners[k] = known;
+    }
+    piece.surface.triangles.push_back(corners);
+  }
+  piece.volume = VolumeOf(piece.surface);
+  piece.bounds = BoundsOf(piece.surface);
+  if (piece.volume < 1e-15) return std::nullopt;
+  return piece;
+}
+
+double DistanceTo(const ConvexPiece& piece, const Eigen::Vector3d& point) {
+  double above = -std::numeric_limits<double>::infinity();
+  for (const HalfSpace& plane : piece.planes) above = std::max(above, plane.normal.dot(point) - plane.offset_m);
+  if (above <= 0) return 0;
+  double best = std::numeric_limits<double>::infinity();
+  for (int t = 0; t < piece.surface.size(); ++t) {
+    const Eigen::Vector3d q =
+        ClosestOnTriangle(point, piece.surface.Corner(t, 0), piece.surface.Corner(t, 1), piece.surface.Corner(t, 2));
+    best = std::min(best, (point - q).squaredNorm());
+  }
+  return std::sqrt(best);
+}
+
+bool IsAlignedBox(const ConvexPiece& piece) {
+  return piece.surface.points.size() == 8 && std::abs(piece.bounds.volume() - piece.volume) < 1e-7 * piece.volume;
+}
+
+}  // namespace feeler::cad

@@ -1,0 +1,212 @@
+#include "feeler/cad/pieces/decompose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "feeler/cad/mesh/mesh_tree.h"
+#include "feeler/cad/pieces/clip.h"
+#include "feeler/cad/section/convex_partition.h"
+#include "feeler/cad/section/section.h"
+
+namespace feeler::cad {
+namespace {
+
+/// Corners whose heights differ by less stand at one level.
+constexpr double kLevel_m = 2e-6;
+/// Bodies narrower than this are left out: they are the rounding of the file, and MuJoCo refuses slivers.
+constexpr double kSliver_m = 1.5e-6;
+
+double ToleranceAt(const DecomposeOptions& options, const Eigen::Vector3d& p) {
+  return options.mating.contains(p) ? options.tolerance_near_m : options.tolerance_far_m;
+}
+
+/// Area of the triangles that lie flat at a height, by level.
+std::vector<double> FlatAreas(const TriangleMesh& mesh, const std::vector<double>& levels) {
+  std::vector<double> areas(levels.size(), 0.0);
+  for (int t = 0; t < mesh.size(); ++t) {
+    const Box box = BoundsOf(mesh, t);
+    if (box.sizes().z() > kLevel_m) continue;
+    const auto at = std::lower_bound(levels.begin(), levels.end(), box.center().z() - kLevel_m);
+    if (at == levels.end()) continue;
+    areas[static_cast<std::size_t>(at - levels.begin())] += AreaVector(mesh, t).norm() / 2;
+  }
+  return areas;
+}
+
+/// The levels at which slabs begin and end: all of them, or, for a free form with more, those with flat faces and as
+/// many others as there is room for, evenly.
+std::vector<double> SlabLevels(const TriangleMesh& mesh, int most) {
+  const std::vector<double> levels = LevelsOf(mesh, kLevel_m);
+  if (static_cast<int>(levels.size()) <= most + 1) return levels;
+  const std::vector<double> areas = FlatAreas(mesh, levels);
+  const double total = std::accumulate(areas.begin(), areas.end(), 0.0);
+  std::vector<double> kept{levels.front()};
+  const double step = (levels.back() - levels.front()) / most;
+  for (std::size_t i = 1; i + 1 < levels.size(); ++i) {
+    if (areas[i] > 1e-3 * total || levels[i] - kept.back() >= step) kept.push_back(levels[i]);
+  }
+  kept.push_back(levels.back());
+  return kept;
+}
+
+bool IsPrism(const Slab& slab) {
+  for (const SlabLoop& loop : slab.loops) {
+    for (const SlabPoint& p : loop) {
+      if ((p.low - p.high).norm() > kLevel_m / 2) return false;
+    }
+  }
+  return true;
+}
+
+bool SameLoop(const SlabLoop& a, const SlabLoop& b, double tolerance_m) {
+  if (a.size() != b.size()) return false;
+  return std::all_of(a.begin(), a.end(), [&](const SlabPoint& p) {
+    return std::any_of(b.begin(), b.end(), [&](const SlabPoint& q) { return (p.middle - q.middle).norm() <= tolerance_m; });
+  });
+}
+
+bool SameSection(const Slab& a, const Slab& b, double tolerance_m) {
+  if (a.loops.size() != b.loops.size()) return false;
+  return std::all_of(a.loops.begin(), a.loops.end(), [&](const SlabLoop& loop) {
+    return std::any_of(b.loops.begin(), b.loops.end(), [&](const SlabLoop& other) { return SameLoop(loop, other, tolerance_m); });
+  });
+}
+
+/// The slabs of a solid, simplified within half of the tolerances; prisms of one cross-section that follow each other are one.
+std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& options) {
+  const std::vector<double> levels = SlabLevels(solid, options.most_slabs);
+  std::vector<Slab> slabs;
+  for (std::size_t i = 0; i + 1 < levels.size(); ++i) {
+    Slab slab = SlabBetween(solid, levels[i], levels[i + 1]);
+    const double height = 0.5 * (slab.low_m + slab.high_m);
+    std::vector<SlabLoop> loops;
+    for (const SlabLoop& loop : slab.loops) {
+      SlabLoop simple = Simplified(loop, [&](const SlabPoint& p) {
+        return 0.5 * ToleranceAt(options, {p.middle.x(), p.middle.y(), height});
+      });
+      if (simple.size() >= 3 && std::abs(SignedArea(simple)) > kSliver_m * kSliver_m) loops.push_back(std::move(simple));
+    }
+    slab.loops = std::move(loops);
+    if (!slabs.empty() && IsPrism(slab) && IsPrism(slabs.back()) && SameSection(slab, slabs.back(), 2 * kLevel_m)) {
+      slabs.back().high_m = slab.high_m;
+      continue;
+    }
+    slabs.push_back(std::move(slab));
+  }
+  return slabs;
+}
+
+/// Width of a polygon across its narrowest side.
+double Narrowest(const SlabLoop& loop) {
+  double longest = 0;
+  for (const SlabPoint& a : loop) {
+    for (const SlabPoint& b : loop) longest = std::max(longest, (a.middle - b.middle).norm());
+  }
+  return longest > 0 ? SignedArea(loop) / longest : 0;
+}
+
+std::vector<ConvexPiece> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options) {
+  std::vector<ConvexPiece> pieces;
+  for (const Slab& slab : slabs) {
+    const double tolerance_m = 0.5 * std::min(options.tolerance_near_m, options.tolerance_far_m);
+    for (const SlabLoop& polygon : ConvexPartition(slab.loops, tolerance_m)) {
+      if (Narrowest(polygon) < kSliver_m) continue;
+      std::vector<Eigen::Vector3d> corners;
+      for (const SlabPoint& p : polygon) {
+        corners.emplace_back(p.low.x(), p.low.y(), slab.low_m);
+        corners.emplace_back(p.high.x(), p.high.y(), slab.high_m);
+      }
+      if (auto piece = HullOf(corners)) pieces.push_back(std::move(*piece));
+    }
+  }
+  return pieces;
+}
+
+bool Near(const Box& a, const Box& b) {
+  return Box(a.min().array() - kLevel_m, a.max().array() + kLevel_m).intersects(b);
+}
+
+/// How much of the smaller of two boxes, seen from above, lies over the other: 1 for pieces of one column.
+double ColumnShare(const Box& a, const Box& b) {
+  const Eigen::Vector3d overlap = a.intersection(b).sizes();
+  const auto area = [](const Eigen::Vector3d& s) { return s.x() * s.y(); };
+  if (overlap.x() <= 0 || overlap.y() <= 0) return 0;
+  return area(overlap) / std::max(std::min(area(a.sizes()), area(b.sizes())), 1e-15);
+}
+
+class Merger {
+ public:
+  Merger(std::vector<ConvexPiece> pieces, const MeshTree& solid, const DecomposeOptions& options)
+      : pieces_(std::move(pieces)), solid_(solid), options_(options) {}
+
+  std::vector<ConvexPiece> Run() {
+    // First what stands on each other, so that wedges around a bore stay wedges; then side by side.
+    while (Pass(0.9)) {
+    }
+    while (Pass(0.0)) {
+    }
+    return std::move(pieces_);
+  }
+
+ private:
+  bool Pass(double least_share) {
+    bool any = false;
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      for (std::size_t j = i + 1; j < pieces_.size();) {
+        if (Near(pieces_[i].bounds, pieces_[j].bounds) && ColumnShare(pieces_[i].bounds, pieces_[j].bounds) >= least_share && Unite(i, j)) {
+          any = true;
+          j = i + 1;
+        } else {
+          ++j;
+        }
+      }
+    }
+    return any;
+  }
+
+  bool Unite(std::size_t i, std::size_t j) {
+    const ConvexPiece& a = pieces_[i];
+    const ConvexPiece& b = pieces_[j];
+    // Before the hull: a body that reaches far beyond both cannot be one with them.
+    std::vector<Eigen::Vector3d> points = a.surface.points;
+    points.insert(points.end(), b.surface.points.begin(), b.surface.points.end());
+    auto hull = HullOf(points);
+    if (!hull) return false;
+    const double more = hull->volume - a.volume - b.volume;
+    const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull->surface) + 2e-3 * (a.volume + b.volume);
+    if (more > allowed || !StaysInside(*hull, solid_, options_)) return false;
+    pieces_[i] = std::move(*hull);
+    pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(j));
+    return true;
+  }
+
+  std::vector<ConvexPiece> pieces_;
+  const MeshTree& solid_;
+  const DecomposeOptions& options_;
+};
+
+}  // namespace
+
+bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options) {
+  bool inside = true;
+  solid.Visit(hull.bounds, [&](int t) {
+    const TriangleMesh& mesh = solid.mesh();
+    const Polygon3 triangle{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
+    const double loose = std::max(options.tolerance_near_m, options.tolerance_far_m);
+    const double tight = std::min(options.tolerance_near_m, options.tolerance_far_m);
+    const Polygon3 entered = ClipToPiece(triangle, hull, -tight);
+    if (entered.empty()) return true;
+    inside = loose > tight && ClipToPiece(entered, hull, -loose).empty() && ClipToBox(entered, options.mating).empty();
+    return inside;
+  });
+  return inside;
+}
+
+std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options) {
+  const MeshTree tree(solid);
+  return Merger(Elementary(SlabsOf(solid, options), options), tree, options).Run();
+}
+
+}  // namespace feeler::cad

@@ -1,0 +1,314 @@
+#include "feeler/cad/section/convex_partition.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+namespace feeler::cad {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kTouch_m = 1e-9;
+/// Reflex corners looked at as the other end of a cut.
+constexpr std::size_t kMostPartners = 16;
+/// A cut that ends this near to a corner ends at it.
+constexpr double kSnap = 0.02;
+/// Between a cut and a side, where there is a choice.
+constexpr double kLeastAngle = kPi / 6;
+
+double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// Angle from `a` counterclockwise to `b`, 0 to 2 pi.
+double Turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  const double angle = std::atan2(Cross(a, b), a.dot(b));
+  return angle < 0 ? angle + 2 * kPi : angle;
+}
+
+/// Material in one piece: the loop around it first, then its holes.
+struct Region {
+  std::vector<SlabLoop> loops;
+};
+
+struct Place {
+  std::size_t loop = 0;
+  std::size_t index = 0;
+  double share = 0.0;  ///< of the side from `index` to the next corner; 0: the corner itself
+};
+
+struct Corner {
+  Place place;
+  Eigen::Vector2d at;
+  Eigen::Vector2d to_next;      ///< directions, not unit
+  Eigen::Vector2d to_previous;
+  double angle = 0.0;           ///< of the material
+};
+
+Corner CornerAt(const Region& region, std::size_t loop, std::size_t index) {
+  const SlabLoop& points = region.loops[loop];
+  const std::size_t count = points.size();
+  Corner corner{{loop, index, 0.0}, points[index].middle, {}, {}, 0.0};
+  corner.to_next = points[(index + 1) % count].middle - corner.at;
+  corner.to_previous = points[(index + count - 1) % count].middle - corner.at;
+  corner.angle = Turn(corner.to_next, corner.to_previous);
+  if (corner.angle < 1e-12) corner.angle = 2 * kPi;  // the end of a cut that stands in the material
+  return corner;
+}
+
+/// How far the corner stands into the polygon beyond the line between its neighbours: what is lost if it is left.
+bool IsReflex(const Corner& corner, double tolerance_m) {
+  if (corner.angle <= kPi + 1e-9) return false;
+  if (corner.angle > 1.5 * kPi) return true;
+  const Eigen::Vector2d chord = corner.to_next - corner.to_previous;
+  const double length = chord.norm();
+  if (length < kTouch_m) return true;
+  return std::abs(Cross(chord, corner.to_next)) / length > tolerance_m;
+}
+
+struct Cut {
+  Place end;
+  double score = std::numeric_limits<double>::infinity();
+};
+
+struct Hit {
+  Place place;
+  double distance = std::numeric_limits<double>::infinity();
+  Eigen::Vector2d side;  ///< direction of the side that was hit, unit
+};
+
+/// The first side that a ray through the material comes to.
+Hit Shoot(const Region& region, const Eigen::Vector2d& from, const Eigen::Vector2d& direction) {
+  Hit hit;
+  for (std::size_t l = 0; l < region.loops.size(); ++l) {
+    const SlabLoop& loop = region.loops[l];
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Eigen::Vector2d& a = loop[i].middle;
+      const Eigen::Vector2d side = loop[(i + 1) % loop.size()].middle - a;
+      const double across = Cross(direction, side);
+      if (across <= 0) continue;  // the ray leaves the material from a side's left to its right
+      const double t = Cross(a - from, side) / across;
+      const double s = Cross(a - from, direction) / across;
+      const double slack = kTouch_m / std::max(side.norm(), kTouch_m);
+      if (t <= kTouch_m || t >= hit.distance || s < -slack || s > 1 + slack) continue;
+      hit = {{l, i, std::clamp(s, 0.0, 1.0)}, t, side.normalized()};
+    }
+  }
+  return hit;
+}
+
+bool Within(const Corner& corner, const Eigen::Vector2d& direction) {
+  const double angle = Turn(corner.to_next, direction);
+  return angle > 1e-9 && angle < corner.angle - 1e-9;
+}
+
+/// The part of the score that asks for cuts that meet sides squarely.
+double Squareness(double angle) { return std::max(std::sin(std::clamp(angle, 0.0, kPi / 2)), 1e-3); }
+
+class Cutter {
+ public:
+  Cutter(Region region, double tolerance_m) : tolerance_m_(tolerance_m) { regions_.push_back(std::move(region)); }
+
+  std::vector<SlabLoop> Run() {
+    std::vector<SlabLoop> done;
+    while (!regions_.empty()) {
+      Region region = std::move(regions_.back());
+      regions_.pop_back();
+      if (!CutOnce(region)) done.push_back(std::move(region.loops.front()));
+    }
+    return done;
+  }
+
+ private:
+  /// False when the region is convex (or nothing can be done about it).
+  bool CutOnce(Region& region) {
+    std::vector<Corner> reflex;
+    for (std::size_t l = 0; l < region.loops.size(); ++l) {
+      for (std::size_t i = 0; i < region.loops[l].size(); ++i) {
+        const Corner corner = CornerAt(region, l, i);
+        // Every hole has to be opened, however small its corners are.
+        if (IsReflex(corner, l == 0 ? tolerance_m_ : 0.0)) reflex.push_back(corner);
+      }
+    }
+    std::stable_sort(reflex.begin(), reflex.end(), [](const Corner& a, const Corner& b) { return a.angle > b.angle + 1e-6; });
+    // Slivers only where there is nothing better.
+    for (const double least_angle : {kLeastAngle, 0.0}) {
+      for (const Corner& corner : reflex) {
+        const Cut cut = BestCut(region, corner, reflex, least_angle);
+        if (!std::isfinite(cut.score)) continue;
+        Apply(region, corner.place, cut.end);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  static Cut BestCut(const Region& region, const Corner& corner, const std::vector<Corner>& reflex, double least_angle) {
+    Cut best;
+    const double least = std::max(corner.angle - kPi, 0.0);
+    const double most = std::min(kPi, corner.angle);
+    for (const double angle : {0.5 * corner.angle, least, most}) {
+      if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) continue;
+      const Eigen::Vector2d direction = Eigen::Rotation2Dd(angle) * corner.to_next.normalized();
+      const Hit hit = Shoot(region, corner.at, direction);
+      if (!std::isfinite(hit.distance)) continue;
+      const double at_end = std::acos(std::clamp(std::abs(direction.dot(hit.side)), 0.0, 1.0));
+      const double score =
+          hit.distance / (Squareness(std::min(angle, corner.angle - angle)) * Squareness(at_end));
+      if (score < best.score * (1 - 1e-9)) best = {Snapped(region, corner, hit, least, most), score};
+    }
+    std::vector<std::pair<double, const Corner*>> partners;
+    for (const Corner& other : reflex) {
+      const double distance = (other.at - corner.at).norm();
+      if (distance > kTouch_m) partners.emplace_back(distance, &other);
+    }
+    std::stable_sort(partners.begin(), partners.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first * (1 - 1e-9); });
+    if (partners.size() > kMostPartners) partners.resize(kMostPartners);
+    for (const auto& [distance, other] : partners) {
+      const Eigen::Vector2d direction = (other->at - corner.at) / distance;
+      const double angle = Turn(corner.to_next, direction);
+      if (angle < least - 1e-9 || angle > most + 1e-9) continue;
+      if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) continue;
+      if (!Within(*other, -direction) || !Sees(region, corner, *other, distance)) continue;
+      const double there = Turn(other->to_next, -direction);
+      if (std::min(there, other->angle - there) < least_angle) continue;
+      const bool both = there >= other->angle - kPi - 1e-9 && there <= kPi + 1e-9;
+      const double score = distance * (both ? 0.5 : 1.0) /
+                           (Squareness(std::min(angle, corner.angle - angle)) *
+                            Squareness(std::min(there, other->angle - there)));
+      if (score < best.score * (1 - 1e-9)) best = {other->place, score};
+    }
+    return best;
+  }
+
+  /// Ends a cut at a corner where it comes close to one, if the corner can take it.
+  static Place Snapped(const Region& region, const Corner& corner, const Hit& hit, double least, double most) {
+    const SlabLoop& loop = region.loops[hit.place.loop];
+    for (const std::size_t index : {hit.place.index, (hit.place.index + 1) % loop.size()}) {
+      const Corner other = CornerAt(region, hit.place.loop, index);
+      const Eigen::Vector2d way = other.at - corner.at;
+      const Eigen::Vector2d end = loop[hit.place.index].middle +
+                                  hit.place.share * (loop[(hit.place.index + 1) % loop.size()].middle - loop[hit.place.index].middle);
+      const double off = (other.at - end).norm();
+      if (off > kTouch_m && off > kSnap * hit.distance) continue;
+      if (way.norm() < kTouch_m) continue;
+      const double angle = Turn(corner.to_next, way);
+      const double slack = off <= kTouch_m ? 1e-6 : 0.0;
+      if (angle < least - slack || angle > most + slack) continue;
+      if (Within(other, -way) && Sees(region, corner, other, way.norm())) return other.place;
+    }
+    return hit.place;
+  }
+
+  static bool Sees(const Region& region, const Corner& from, const Corner& to, double distance) {
+    const Hit hit = Shoot(region, from.at, (to.at - from.at) / distance);
+    return hit.distance >= distance - 2 * kTouch_m;
+  }
+
+  static SlabPoint PointAt(const SlabLoop& loop, const Place& place) {
+    const SlabPoint& a = loop[place.index];
+    const SlabPoint& b = loop[(place.index + 1) % loop.size()];
+    const auto mix = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) -> Eigen::Vector2d { return p + place.share * (q - p); };
+    return {mix(a.middle, b.middle), mix(a.low, b.low), mix(a.high, b.high)};
+  }
+
+  void Apply(Region& region, Place begin, Place end) {
+    SlabLoop& end_loop = region.loops[end.loop];
+    if (end.share > 0) {
+      const SlabPoint& a = end_loop[end.index];
+      const SlabPoint& b = end_loop[(end.index + 1) % end_loop.size()];
+      const SlabPoint point = PointAt(end_loop, end);
+      if ((point.middle - b.middle).norm() < kTouch_m) {
+        end = {end.loop, (end.index + 1) % end_loop.size(), 0.0};
+      } else if ((point.middle - a.middle).norm() < kTouch_m) {
+        end.share = 0;
+      } else {
+        end_loop.insert(end_loop.begin() + static_cast<std::ptrdiff_t>(end.index) + 1, point);
+        if (begin.loop == end.loop && begin.index > end.index) ++begin.index;
+        end = {end.loop, end.index + 1, 0.0};
+      }
+    }
+    if (begin.loop == end.loop) {
+      Split(region, begin.loop, begin.index, end.index);
+    } else {
+      Join(region, begin, end);
+    }
+  }
+
+  static SlabLoop Walk(const SlabLoop& loop, std::size_t from, std::size_t to) {
+    SlabLoop part;
+    for (std::size_t i = from;; i = (i + 1) % loop.size()) {
+      part.push_back(loop[i]);
+      if (i == to) return part;
+    }
+  }
+
+  void Split(Region& region, std::size_t loop, std::size_t a, std::size_t b) {
+    std::vector<SlabLoop> outer;
+    std::vector<SlabLoop> holes;
+    for (SlabLoop& part : std::vector<SlabLoop>{Walk(region.loops[loop], a, b), Walk(region.loops[loop], b, a)}) {
+      if (part.size() < 3) continue;
+      (SignedArea(part) > 0 ? outer : holes).push_back(std::move(part));
+    }
+    if (loop != 0) outer.push_back(std::move(region.loops.front()));
+    for (std::size_t l = 1; l < region.loops.size(); ++l) {
+      if (l != loop) holes.push_back(std::move(region.loops[l]));
+    }
+    Distribute(std::move(outer), std::move(holes), regions_);
+  }
+
+  void Join(Region& region, const Place& begin, const Place& end) {
+    SlabLoop joined = region.loops[begin.loop];
+    std::rotate(joined.begin(), joined.begin() + static_cast<std::ptrdiff_t>(begin.index), joined.end());
+    joined.push_back(joined.front());
+    const SlabLoop& other = region.loops[end.loop];
+    for (std::size_t i = 0; i <= other.size(); ++i) joined.push_back(other[(end.index + i) % other.size()]);
+    const std::size_t into = std::min(begin.loop, end.loop);
+    const std::size_t gone = std::max(begin.loop, end.loop);
+    region.loops[into] = std::move(joined);
+    region.loops.erase(region.loops.begin() + static_cast<std::ptrdiff_t>(gone));
+    regions_.push_back(std::move(region));
+  }
+
+ public:
+  /// Gives each hole to the smallest loop around it.
+  static void Distribute(std::vector<SlabLoop> outer, std::vector<SlabLoop> holes, std::vector<Region>& regions) {
+    std::vector<Region> made;
+    for (SlabLoop& loop : outer) made.push_back({{std::move(loop)}});
+    for (SlabLoop& hole : holes) {
+      Region* smallest = nullptr;
+      for (Region& region : made) {
+        const SlabLoop& around = region.loops.front();
+        if (!Encloses(around, hole.front().middle) && !Encloses(around, 0.5 * (hole[0].middle + hole[1].middle))) continue;
+        if (smallest == nullptr || SignedArea(around) < SignedArea(smallest->loops.front())) smallest = &region;
+      }
+      if (smallest != nullptr) smallest->loops.push_back(std::move(hole));
+    }
+    for (Region& region : made) regions.push_back(std::move(region));
+  }
+
+ private:
+  double tolerance_m_;
+  std::vector<Region> regions_;
+};
+
+}  // namespace
+
+std::vector<SlabLoop> ConvexPartition(const std::vector<SlabLoop>& loops, double tolerance_m) {
+  std::vector<SlabLoop> outer;
+  std::vector<SlabLoop> holes;
+  for (const SlabLoop& loop : loops) {
+    if (loop.size() >= 3) (SignedArea(loop) > 0 ? outer : holes).push_back(loop);
+  }
+  std::vector<Region> regions;
+  Cutter::Distribute(std::move(outer), std::move(holes), regions);
+  std::vector<SlabLoop> polygons;
+  for (Region& region : regions) {
+    for (SlabLoop& polygon : Cutter(std::move(region), tolerance_m).Run()) polygons.push_back(std::move(polygon));
+  }
+  return polygons;
+}
+
+}  // namespace feeler::cad
