@@ -13,11 +13,13 @@
 #include "feeler/cli/commands.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
+#include "feeler/cli/task_import.h"
 #include "feeler/core/error.h"
 #include "feeler/env/contact/axis_visibility.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/env/vision/image.h"
 #include "feeler/env/vision/renderer.h"
+#include "feeler/env/vision/task_views.h"
 #include "feeler/workflow/setup/planning_setup.h"
 
 namespace feeler::cli {
@@ -28,6 +30,8 @@ struct Flags {
   std::string opening = "closed";
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   std::string view = "overview";
+  double depth_mm = -2.0;
+  bool no_lids = false;
   std::string out;
   bool json = false;
 };
@@ -162,16 +166,20 @@ void Show(const Flags& flags) {
   }
 }
 
+env::Image RenderView(const env::TaskModel& model, const Flags& flags) {
+  if (flags.view == "overview") return env::RenderSceneImage(env::BuildScene(model), env::SceneView::kOverview);
+  if (flags.view == "close-up") return env::RenderSceneImage(env::BuildScene(model), env::SceneView::kCloseUp);
+  env::TaskViewOptions options;
+  options.depth_m = flags.depth_mm / 1000;
+  options.show_lids = !flags.no_lids;
+  if (flags.view == "mouth") return env::RenderTaskMouth(model, options);
+  if (flags.view == "section") return env::RenderTaskSection(model, options);
+  throw InputError("--view", "unknown view \"" + flags.view + "\"", "choose one of overview, close-up, section, mouth");
+}
+
 void Render(const Flags& flags) {
-  env::SceneView view = env::SceneView::kOverview;
-  if (flags.view == "close-up") {
-    view = env::SceneView::kCloseUp;
-  } else if (flags.view != "overview") {
-    throw InputError("--view", "unknown view \"" + flags.view + "\"", "choose one of overview, close-up");
-  }
   RequireWritable("--out", flags.out);
-  const env::Scene scene = env::BuildScene(env::LoadTask(flags.task));
-  env::WritePng(env::RenderSceneImage(scene, view), flags.out);
+  env::WritePng(RenderView(env::LoadTask(flags.task), flags), flags.out);
 }
 
 void MakePipeParts(const cad::PipeParameters& parameters, const std::string& folder) {
@@ -199,7 +207,7 @@ void List(bool json) {
 
 }  // namespace
 
-void AddTaskCommand(CLI::App& app, Session& /*session*/) {
+void AddTaskCommand(CLI::App& app, Session& session) {
   CLI::App* task = app.add_subcommand("task", "Tasks: what is inserted into what");
   task->require_subcommand(1);
   auto flags = std::make_shared<Flags>();
@@ -212,11 +220,16 @@ void AddTaskCommand(CLI::App& app, Session& /*session*/) {
   show->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
   show->add_flag("--json", flags->json, "print JSON");
   show->callback([flags] { Show(*flags); });
-  CLI::App* render = task->add_subcommand("render", "A picture of robot, tool and target at the start pose");
+  CLI::App* render = task->add_subcommand("render", "A picture of a task: at the start pose, cut open, or into the mouth");
   render->add_option("task", flags->task, "name, or path of a task file")->required();
-  render->add_option("--view", flags->view, "overview or close-up")->capture_default_str();
+  render->add_option("--view", flags->view, "overview, close-up, section (cut open) or mouth (into the opening)")
+      ->capture_default_str();
+  render->add_option("--depth", flags->depth_mm, "section: of the tool below the mouth, mm; negative: above it")
+      ->capture_default_str();
+  render->add_flag("--no-lids", flags->no_lids, "section, mouth: without what closes the opening while localizing");
   render->add_option("--out", flags->out, "PNG file to write")->required();
   render->callback([flags] { Render(*flags); });
+  AddTaskImport(*task, session);
 
   CLI::App* pipes =
       task->add_subcommand("make-pipe-parts", "Writes the parts of pipes and elbows from sizes in metres");

@@ -1,0 +1,335 @@
+#include "feeler/cad/align/alignment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <numbers>
+
+#include "feeler/cad/align/candidates.h"
+#include "feeler/cad/measure/sliding.h"
+#include "feeler/cad/mesh/mesh_tree.h"
+#include "feeler/core/error.h"
+
+namespace feeler::cad {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+/// What is in by less than this is not in.
+constexpr double kLeastEngaged_m = 4e-4;
+/// Play of more than this share of the feature is no fit.
+constexpr double kMostSlack = 0.35;
+/// Verified by sliding, the most promising first.
+constexpr std::size_t kMostTrials = 120;
+constexpr double kAbove_m = 1e-3;
+
+/// A part turned so that one of its directions is z.
+struct Turned {
+  Eigen::Matrix3d rotation;
+  TriangleMesh mesh;
+  std::vector<Feature> features;
+  std::unique_ptr<MeshTree> tree;
+};
+
+struct Trial {
+  std::size_t tool = 0;  ///< number of the direction
+  std::size_t target = 0;
+  double roll_rad = 0.0;
+  Eigen::Vector2d place;  ///< of the turned tool's origin, in x and y
+  bool tool_has_opening = false;
+  double high_m = 0.0;  ///< of the feature of the target
+  double low_m = 0.0;
+  double size_m = 0.0;  ///< of the inner feature
+  double fit = 0.0;     ///< area of what goes in, over that of the hole
+};
+
+struct Found {
+  Trial trial;
+  Eigen::Vector3d offset;
+  double engaged_m;
+  double slack_m;
+};
+
+Eigen::Matrix3d Roll(double angle) {
+  Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  for (double& value : rotation.reshaped()) {
+    if (std::abs(value - std::round(value)) < 1e-12) value = std::round(value);
+  }
+  return rotation;
+}
+
+Turned TurnedPart(const TriangleMesh& mesh, const Eigen::Matrix3d& rotation) {
+  Turned part;
+  part.rotation = rotation;
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation;
+  part.mesh = Transformed(mesh, pose);
+  part.features = FeaturesOf(part.mesh);
+  return part;
+}
+
+Eigen::AlignedBox2d RolledBounds(const SlabLoop& loop, double roll) {
+  const Eigen::Rotation2Dd rotation(roll);
+  Eigen::AlignedBox2d box;
+  for (const SlabPoint& p : loop) box.extend(rotation * p.middle);
+  return box;
+}
+
+std::vector<double> Rolls(const Feature& tool, const Feature& target) {
+  std::vector<double> rolls{0.0, kPi / 2, kPi, 1.5 * kPi};
+  if (tool.has_edges && target.has_edges) {
+    for (int k = 0; k < 4; ++k) {
+      double roll = target.edge_rad - tool.edge_rad + k * kPi / 2;
+      roll -= 2 * kPi * std::floor(roll / (2 * kPi) + 1e-9);
+      if (std::none_of(rolls.begin(), rolls.end(), [&](double r) { return std::abs(r - roll) < 1e-4; }))
+        rolls.push_back(roll);
+    }
+  }
+  return rolls;
+}
+
+/// The nearest of what does not fit, for the message.
+struct Miss {
+  double too_wide_m = std::numeric_limits<double>::infinity();
+  Eigen::Vector2d inner = Eigen::Vector2d::Zero();
+  Eigen::Vector2d hole = Eigen::Vector2d::Zero();
+};
+
+void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targets, std::vector<Trial>& trials,
+               Miss& miss) {
+  for (std::size_t a = 0; a < tools.size(); ++a) {
+    for (std::size_t b = 0; b < targets.size(); ++b) {
+      for (const Feature& f : tools[a].features) {
+        for (const Feature& g : targets[b].features) {
+          if (f.hole == g.hole) continue;
+          const double fit = f.hole ? g.area / f.area : f.area / g.area;
+          if (fit < 0.25 || fit > 1.15) continue;
+          for (const double roll : Rolls(f, g)) {
+            const Eigen::AlignedBox2d tool_box = RolledBounds(f.loop, roll);
+            const Eigen::AlignedBox2d target_box = BoundsOf(g.loop);
+            const Eigen::Vector2d inner = f.hole ? target_box.sizes() : tool_box.sizes();
+            const Eigen::Vector2d hole = f.hole ? tool_box.sizes() : target_box.sizes();
+            const double too_wide = (inner - hole).maxCoeff();
+            if (too_wide > 0 || fit > 1) {
+              if (std::max(too_wide, 0.0) < miss.too_wide_m && fit > 0.6) miss = {std::max(too_wide, 0.0), inner, hole};
+              continue;
+            }
+            trials.push_back({a, b, roll, target_box.center() - tool_box.center(), f.hole, g.high_m, g.low_m,
+                              inner.minCoeff(), fit});
+          }
+        }
+      }
+    }
+  }
+  std::stable_sort(trials.begin(), trials.end(), [](const Trial& x, const Trial& y) { return x.fit > y.fit + 1e-6; });
+}
+
+/// Puts the tool into the middle of its play across; false when it has too much or none.
+bool Center(const MeshSlide& slide, double most_m, Eigen::Vector3d& offset, double& slack_m) {
+  for (int round = 0; round < 3; ++round) {
+    slack_m = 0;
+    for (int axis = 0; axis < 2; ++axis) {
+      const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
+      const double up = slide.Travel(offset, unit, most_m);
+      const double down = slide.Travel(offset, -unit, most_m);
+      if (up >= most_m || down >= most_m) return false;
+      offset += 0.5 * (up - down) * unit;
+      slack_m = std::max(slack_m, 0.5 * (up + down));
+    }
+  }
+  return slack_m > 2e-7;
+}
+
+std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const Trial& trial) {
+  Pose roll = Pose::Identity();
+  roll.linear() = Roll(trial.roll_rad);
+  const TriangleMesh tool = Transformed(tool_part.mesh, roll);
+  const Box tool_box = BoundsOf(tool);
+  const Box target_box = BoundsOf(target.mesh);
+  const MeshSlide slide(tool, *target.tree);
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  const double clear = target_box.max().z() - tool_box.min().z() + kAbove_m;
+  const double through = target_box.sizes().z() + tool_box.sizes().z() + 2 * kAbove_m;
+  Eigen::Vector3d offset(trial.place.x(), trial.place.y(), clear);
+  Found found{trial, offset, 0, 0};
+  const double most_slack = std::max(kMostSlack * trial.size_m, 3e-4);
+  for (int round = 0; round < 3; ++round) {
+    // What of the target's feature the tool reaches; a tool that goes through stops where the hole ends.
+    const double travel = slide.Travel(offset, down, through);
+    double depth = trial.high_m - (tool_box.min().z() + offset.z() - travel);
+    depth = std::min(depth, std::min(trial.high_m - trial.low_m, tool_box.sizes().z()));
+    if (depth < kLeastEngaged_m) return std::nullopt;
+    Eigen::Vector3d in = offset;
+    in.z() = trial.high_m - tool_box.min().z() - depth + std::min(1e-4, 0.1 * depth);
+    // The feature's own depth may be less than that of the way: the tool may not stand in the floor.
+    in.z() = std::max(in.z(), offset.z() - travel + 1e-5);
+    if (!Center(slide, most_slack, in, found.slack_m)) return std::nullopt;
+    found.engaged_m = depth;
+    found.offset = in;
+    offset.head<2>() = in.head<2>();
+    if (slide.Travel(in, Eigen::Vector3d::UnitZ(), through) < through) return std::nullopt;  // not the way it came
+  }
+  // Down to where it stops, or as deep as they are in each other at most.
+  const double rest = slide.Travel(found.offset, down, through);
+  const double bottom = std::min(found.offset.z() - (trial.low_m - tool_box.min().z()), rest);
+  found.offset.z() -= rest < through ? rest : std::max(bottom, 0.0);
+  found.engaged_m = trial.high_m - (tool_box.min().z() + found.offset.z());
+  return found;
+}
+
+/// How near the choice is to the CAD frames as they are; of equals the least.
+double Strangeness(const Found& found) {
+  return 16.0 * static_cast<double>(found.trial.target) + 4.0 * static_cast<double>(found.trial.tool) +
+         std::min(found.trial.roll_rad, 2 * kPi - found.trial.roll_rad);
+}
+
+Pose FrameOf(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& offset) {
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation;
+  pose.translation() = offset;
+  return pose;
+}
+
+Eigen::Vector3d MouthInTarget(const Turned& target, const Turned& tool, const Found& found) {
+  const Box box = BoundsOf(Transformed(tool.mesh, FrameOf(Roll(found.trial.roll_rad), found.offset)));
+  return target.rotation.transpose() * Eigen::Vector3d(box.center().x(), box.center().y(), found.trial.high_m);
+}
+
+std::string InMillimetres(const Eigen::Vector3d& p) {
+  return fmt::format("{:.2f},{:.2f},{:.2f}", 1000 * p.x() + 0.0, 1000 * p.y() + 0.0, 1000 * p.z() + 0.0);
+}
+
+[[noreturn]] void NoFit(const Miss& miss, bool tried) {
+  if (tried) {
+    throw InputError("tool and target",
+                     "sections of one fit into holes of the other, but no way in leads there along an axis",
+                     "give the assembled poses with --aligned, or --tool-pose and --target-pose");
+  }
+  if (!std::isfinite(miss.too_wide_m)) {
+    throw InputError("tool and target", "do not fit: no section of one is near the size of a hole of the other",
+                     "are both in the same --unit, and is it these two that mate?");
+  }
+  throw InputError(
+      "tool and target",
+      fmt::format("do not fit: the nearest is {:.3f} x {:.3f} mm for a hole of {:.3f} x {:.3f} mm, {:.3f} mm too wide",
+                  1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(), 1000 * miss.hole.y(),
+                  1000 * miss.too_wide_m),
+      "check the sizes and the --unit");
+}
+
+}  // namespace
+
+Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, const AlignOptions& options) {
+  std::vector<Turned> tools;
+  std::vector<Turned> targets;
+  // The first direction of a tool is its CAD frame's -z: it comes down.
+  for (const Eigen::Vector3d& d : CandidateDirections(tool)) tools.push_back(TurnedPart(tool, RotationToZ(d)));
+  for (const Eigen::Vector3d& d : CandidateDirections(target)) targets.push_back(TurnedPart(target, RotationToZ(d)));
+  std::vector<Trial> trials;
+  Miss miss;
+  AddTrials(tools, targets, trials, miss);
+  if (trials.empty()) NoFit(miss, false);
+  std::vector<Found> found;
+  std::size_t tried = 0;
+  for (const Trial& trial : trials) {
+    if (++tried > kMostTrials) break;
+    Turned& turned = targets[trial.target];
+    if (!turned.tree) turned.tree = std::make_unique<MeshTree>(turned.mesh);
+    if (auto result = Verify(tools[trial.tool], turned, trial)) {
+      if (!options.mouth ||
+          (MouthInTarget(turned, tools[trial.tool], *result) - *options.mouth).norm() < 0.5 * trial.size_m + 2e-3) {
+        found.push_back(*result);
+      }
+    }
+  }
+  if (found.empty()) NoFit(miss, true);
+  // The tightest fit; of equals the deepest; of equals that nearest to the CAD frames.
+  const auto tightest = *std::min_element(found.begin(), found.end(),
+                                          [](const Found& a, const Found& b) { return a.slack_m < b.slack_m; });
+  double deepest = 0;
+  const auto as_tight = [&](const Found& f) { return f.slack_m <= 1.25 * tightest.slack_m + 5e-6; };
+  for (const Found& f : found) {
+    if (as_tight(f)) deepest = std::max(deepest, f.engaged_m);
+  }
+  const Found* best = nullptr;
+  std::vector<const Found*> equals;
+  for (const Found& f : found) {
+    if (!as_tight(f) || f.engaged_m < 0.9 * deepest) continue;
+    equals.push_back(&f);
+    if (best == nullptr || Strangeness(f) < Strangeness(*best) - 1e-9) best = &f;
+  }
+  const Turned& chosen_tool = tools[best->trial.tool];
+  const Turned& chosen_target = targets[best->trial.target];
+  Alignment alignment;
+  const Eigen::Vector3d mouth = MouthInTarget(chosen_target, chosen_tool, *best);
+  int ways = 0;
+  for (const Found* other : equals) {
+    if (other == best) continue;
+    if (other->trial.target == best->trial.target) {
+      const Eigen::Vector3d there = MouthInTarget(chosen_target, tools[other->trial.tool], *other);
+      if ((there - mouth).norm() > 5e-4 + 2 * best->slack_m) {
+        throw InputError(
+            "target",
+            fmt::format("two mouths fit as well: at {} and at {} mm", InMillimetres(mouth), InMillimetres(there)),
+            "choose one with --mouth X,Y,Z");
+      }
+    }
+    ++ways;
+  }
+  if (ways > 0)
+    alignment.notes.push_back(fmt::format(
+        "the parts go together in {} ways that are alike; taken is the one nearest to the CAD frames", ways + 1));
+  alignment.frame_T_tool = FrameOf(Roll(best->trial.roll_rad) * chosen_tool.rotation, best->offset);
+  alignment.frame_T_target = FrameOf(chosen_target.rotation, Eigen::Vector3d::Zero());
+  alignment.tool_has_opening = best->trial.tool_has_opening;
+  alignment.engaged_m = best->engaged_m;
+  alignment.slack_m = best->slack_m;
+  return alignment;
+}
+
+Alignment AlignAssembled(const TriangleMesh& tool, const TriangleMesh& target) {
+  const MeshTree as_given(target);
+  if (MeshSlide(tool, as_given).Overlap(Eigen::Vector3d::Zero())) {
+    throw InputError("tool and target", "overlap as they are placed",
+                     "place them as assembled, with clearance all around");
+  }
+  std::optional<Alignment> best;
+  std::vector<Eigen::Vector3d> directions = CandidateDirections(target);
+  for (const Eigen::Vector3d& d : CandidateDirections(tool)) {
+    if (std::none_of(directions.begin(), directions.end(), [&](const auto& known) { return known.dot(d) > 0.99996; }))
+      directions.push_back(d);
+  }
+  for (const Eigen::Vector3d& direction : directions) {
+    const Pose turn = FrameOf(RotationToZ(direction), Eigen::Vector3d::Zero());
+    const TriangleMesh turned_tool = Transformed(tool, turn);
+    const TriangleMesh turned_target = Transformed(target, turn);
+    const MeshTree tree(turned_target);
+    const MeshSlide slide(turned_tool, tree);
+    const Box tool_box = BoundsOf(turned_tool);
+    const double out = BoundsOf(turned_target).sizes().z() + tool_box.sizes().z();
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    if (slide.Travel(offset, Eigen::Vector3d::UnitZ(), out) < out) continue;
+    double slack = 0;
+    const double most = kMostSlack * std::min(tool_box.sizes().x(), tool_box.sizes().y());
+    if (!Center(slide, most, offset, slack)) continue;
+    if (best && best->slack_m <= slack * (1 + 1e-6)) continue;
+    Alignment alignment;
+    alignment.frame_T_tool = FrameOf(turn.linear(), offset);
+    alignment.frame_T_target = turn;
+    alignment.slack_m = slack;
+    if (offset.norm() > 2e-6)
+      alignment.notes.push_back(fmt::format("the tool is moved by {:.3f}, {:.3f} mm to the middle of its play",
+                                            1000 * offset.x(), 1000 * offset.y()));
+    best = alignment;
+  }
+  if (!best) {
+    throw InputError("tool and target", "the tool does not come out along any axis with play, but little, to all sides",
+                     "place them as assembled; the parts have to be in each other");
+  }
+  return *best;
+}
+
+}  // namespace feeler::cad

@@ -1,0 +1,137 @@
+#include "feeler/cad/align/candidates.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace feeler::cad {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kSameDirection = 0.99996;  // cosine of half a degree
+constexpr std::size_t kMostNormals = 8;
+constexpr double kLeastShare = 0.02;  ///< of the surface, for a normal to count
+constexpr std::size_t kMostSlabs = 24;
+
+void Dominant(Feature& feature) {
+  constexpr int kBins = 360;
+  std::array<double, kBins> length{};
+  double perimeter = 0;
+  const auto bin_of = [](double angle) { return static_cast<int>(std::floor(angle / kPi * kBins)) % kBins; };
+  const auto angle_of = [](const Eigen::Vector2d& e) {
+    const double angle = std::atan2(e.y(), e.x());
+    const double folded = angle < 0 ? angle + kPi : angle;
+    return folded >= kPi - 1e-9 ? 0.0 : folded;
+  };
+  const std::size_t count = feature.loop.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d e = feature.loop[(i + 1) % count].middle - feature.loop[i].middle;
+    length[static_cast<std::size_t>(bin_of(angle_of(e) + 1e-9))] += e.norm();
+    perimeter += e.norm();
+  }
+  const auto best = std::max_element(length.begin(), length.end());
+  feature.has_edges = *best > 0.08 * perimeter;
+  // The exact direction: that of the longest edge in the bin.
+  double longest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d e = feature.loop[(i + 1) % count].middle - feature.loop[i].middle;
+    if (bin_of(angle_of(e) + 1e-9) != best - length.begin() || e.norm() <= longest + 1e-9) continue;
+    longest = e.norm();
+    feature.edge_rad = angle_of(e);
+  }
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh) {
+  struct Group {
+    Eigen::Vector3d normal;
+    double area;
+  };
+  std::vector<Group> groups;
+  double total = 0;
+  for (int t = 0; t < mesh.size(); ++t) {
+    const Eigen::Vector3d area = AreaVector(mesh, t);
+    const double size = area.norm();
+    if (size < 1e-14) continue;
+    total += size;
+    Eigen::Vector3d normal = area / size;
+    bool found = false;
+    for (Group& group : groups) {
+      if (std::abs(group.normal.dot(normal)) < kSameDirection) continue;
+      group.area += size;
+      found = true;
+      break;
+    }
+    if (!found && groups.size() < 2000) groups.push_back({normal, size});
+  }
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const Group& a, const Group& b) { return a.area > b.area * (1 + 1e-9); });
+  std::vector<Eigen::Vector3d> directions;
+  const auto add = [&](const Eigen::Vector3d& d) {
+    for (const Eigen::Vector3d& known : directions) {
+      if (known.dot(d) > kSameDirection) return;
+    }
+    directions.push_back(d);
+  };
+  for (const int axis : {2, 0, 1}) {
+    add(Eigen::Vector3d::Unit(axis));
+    add(-Eigen::Vector3d::Unit(axis));
+  }
+  for (std::size_t i = 0; i < std::min(groups.size(), kMostNormals); ++i) {
+    if (groups[i].area < kLeastShare * total) break;
+    add(groups[i].normal);
+    add(-groups[i].normal);
+  }
+  return directions;
+}
+
+Eigen::Matrix3d RotationToZ(const Eigen::Vector3d& direction) {
+  if (direction.z() < -1 + 1e-12) return Eigen::Vector3d(1, -1, -1).asDiagonal();
+  Eigen::Matrix3d rotation = Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  for (double& value : rotation.reshaped()) {
+    if (std::abs(value - std::round(value)) < 1e-12) value = std::round(value);
+  }
+  return rotation;
+}
+
+std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
+  const std::vector<double> levels = LevelsOf(mesh, 2e-6);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i + 1 < levels.size(); ++i) order.push_back(i);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return levels[a + 1] - levels[a] > levels[b + 1] - levels[b] + 1e-9;
+  });
+  if (order.size() > kMostSlabs) order.resize(kMostSlabs);
+  std::sort(order.begin(), order.end());
+  std::vector<Feature> features;
+  for (const std::size_t i : order) {
+    for (const SlabLoop& raw : SlabBetween(mesh, levels[i], levels[i + 1]).loops) {
+      Feature feature;
+      feature.loop = Simplified(raw, [](const SlabPoint&) { return 1e-6; });
+      const double area = SignedArea(feature.loop);
+      feature.hole = area < 0;
+      feature.area = std::abs(area);
+      feature.low_m = levels[i];
+      feature.high_m = levels[i + 1];
+      if (feature.area < 1e-8) continue;  // a tenth of a millimetre across
+      // The same line, further up: one feature.
+      bool again = false;
+      for (Feature& known : features) {
+        if (known.hole != feature.hole || std::abs(known.high_m - feature.low_m) > 1e-9) continue;
+        if (std::abs(known.area - feature.area) > 1e-4 * feature.area) continue;
+        if ((BoundsOf(known.loop).center() - BoundsOf(feature.loop).center()).norm() > 1e-5) continue;
+        known.high_m = feature.high_m;
+        again = true;
+        break;
+      }
+      if (again) continue;
+      Dominant(feature);
+      features.push_back(std::move(feature));
+    }
+  }
+  return features;
+}
+
+}  // namespace feeler::cad

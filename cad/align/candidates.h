@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "feeler/cad/mesh/triangle_mesh.h"
+#include "feeler/cad/section/section.h"
+
+namespace feeler::cad {
+
+/// Directions along which a part may be meant to move: the axes of its CAD frame, and the normals of its larger flat
+/// faces; both ways. Unit vectors, no two within half a degree.
+std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh);
+
+/// The rotation that brings `direction` to +z by the shortest way, exactly for axes.
+Eigen::Matrix3d RotationToZ(const Eigen::Vector3d& direction);
+
+/// A line around material or around a hole, over a range of heights.
+struct Feature {
+  bool hole = false;
+  double low_m = 0.0;
+  double high_m = 0.0;
+  SlabLoop loop;
+  double area = 0.0;       ///< m^2, positive
+  double edge_rad = 0.0;   ///< direction in which most of its length runs, modulo half a turn
+  bool has_edges = false;  ///< else it is round: every direction is as good
+};
+
+/// The loops of a part whose cross-sections across z are looked at at its thicker slabs.
+std::vector<Feature> FeaturesOf(const TriangleMesh& mesh);
+
+}  // namespace feeler::cad
