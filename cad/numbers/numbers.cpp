@@ -50,22 +50,27 @@ struct CellChoice {
   double best_margin;
 };
 
-/// Of the cells from 0.5 to 2 mm, those within a tenth of the best margin; of them the largest: fewer hypotheses.
+/// Of the cells from 0.5 to 2 mm whose walls stay three tenths of a cell off lattice planes, that with the largest
+/// distance in millimetres; where there is none, the cell with the best margin.
 CellChoice ChooseCell(const Walls& walls, const Eigen::Vector3d& uncertainty_m) {
-  CellChoice choice{0.002, 0, 0};
-  const auto allowed = [&](double cell) { return std::ceil(2 * uncertainty_m.maxCoeff() / cell - 1e-9) <= kMostCells; };
-  for (int step = 50; step <= 200; step += 1) {
-    if (allowed(step * 1e-5)) choice.best_margin = std::max(choice.best_margin, MarginAt(walls, step * 1e-5));
-  }
-  for (int step = 200; step >= 50; step -= 1) {
+  constexpr double kComfortable = 0.3;
+  CellChoice most_room{0, 0, 0};
+  CellChoice best{0, -1, 0};
+  for (int step = 200; step >= 50; --step) {
     const double cell = step * 1e-5;
-    if (!allowed(cell)) continue;
+    if (std::ceil(2 * uncertainty_m.maxCoeff() / cell - 1e-9) > kMostCells) continue;
     const double margin = MarginAt(walls, cell);
-    if (margin >= 0.9 * choice.best_margin) return {cell, margin, choice.best_margin};
+    if (margin > best.margin + 1e-9) best = {cell, margin, 0};
+    if (margin >= kComfortable && margin * cell > most_room.margin * most_room.cell_m + 1e-12) most_room = {cell, margin, 0};
   }
-  // An uncertainty too large for these cells.
-  const double cell = std::ceil(2 * uncertainty_m.maxCoeff() / kMostCells * 1e4) * 1e-4;
-  return {cell, MarginAt(walls, cell), MarginAt(walls, cell)};
+  CellChoice choice = most_room.cell_m > 0 ? most_room : best;
+  if (choice.cell_m == 0) {
+    // An uncertainty too large for these cells.
+    choice.cell_m = std::ceil(2 * uncertainty_m.maxCoeff() / kMostCells * 1e4) * 1e-4;
+    choice.margin = best.margin = MarginAt(walls, choice.cell_m);
+  }
+  choice.best_margin = best.margin;
+  return choice;
 }
 
 class Derivation {
@@ -125,7 +130,7 @@ class Derivation {
     const std::string cell = Add(
         "feeler_resolution", false, Repeated(Plain(choice.cell_m), uncertain_.size()),
         fmt::format(
-            "scanned from 0.5 to 2 mm: the largest cell whose walls stay {:.2f} cells off lattice planes (best {:.2f})",
+            "scanned from 0.5 to 2 mm: the cell whose walls stay farthest from lattice planes, {:.2f} cells (best margin {:.2f})",
             choice.margin, choice.best_margin));
     result_.cell_m = First(cell);
     if (!(result_.cell_m > 0))

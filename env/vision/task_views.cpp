@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "feeler/core/error.h"
+#include "feeler/env/model/geom_shapes.h"
 #include "feeler/env/model/mujoco_handles.h"
 #include "feeler/env/vision/renderer.h"
-#include "feeler/planner/contact/convex_shape.h"
 
 namespace feeler::env {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/contact/axis_visibility.h"
-#include "feeler/planner/options.h"
+#include "feeler/planner/options/solver_options.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/setup/database_builder.h"
 #include "feeler/workflow/setup/planning_setup.h"

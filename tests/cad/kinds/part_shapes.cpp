@@ -1,0 +1,257 @@
+#include "tests/cad/kinds/part_shapes.h"
+
+#include <BRepAlgoAPI_Cut.hxx>
+#include <BRepAlgoAPI_Fuse.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
+#include <BRepBuilderAPI_MakePolygon.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepPrimAPI_MakeBox.hxx>
+#include <BRepPrimAPI_MakeCone.hxx>
+#include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepPrimAPI_MakePrism.hxx>
+#include <BRep_Builder.hxx>
+#include <BRep_Tool.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <STEPControl_Writer.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopLoc_Location.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Compound.hxx>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "feeler/cad/folder/task_folder.h"
+
+namespace feeler::cad {
+namespace {
+
+using Shape = TopoDS_Shape;
+using Points = std::vector<std::pair<double, double>>;
+constexpr double kPi = std::numbers::pi;
+
+Shape Box3(double x0, double x1, double y0, double y1, double z0, double z1) {
+  return BRepPrimAPI_MakeBox(gp_Pnt(x0, y0, z0), gp_Pnt(x1, y1, z1)).Shape();
+}
+/// Centred on the z axis.
+Shape Block(double x, double y, double z0, double z1) { return Box3(-x / 2, x / 2, -y / 2, y / 2, z0, z1); }
+Shape Rod(double x, double y, double radius, double z0, double z1) {
+  return BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(x, y, z0), gp_Dir(0, 0, 1)), radius, z1 - z0).Shape();
+}
+Shape Cone(double radius0, double radius1, double z0, double z1) {
+  return BRepPrimAPI_MakeCone(gp_Ax2(gp_Pnt(0, 0, z0), gp_Dir(0, 0, 1)), radius0, radius1, z1 - z0).Shape();
+}
+Shape Prism(const Points& points, double z0, double z1) {
+  BRepBuilderAPI_MakePolygon polygon;
+  for (const auto& [x, y] : points) polygon.Add(gp_Pnt(x, y, z0));
+  polygon.Close();
+  return BRepPrimAPI_MakePrism(BRepBuilderAPI_MakeFace(polygon.Wire()).Face(), gp_Vec(0, 0, z1 - z0)).Shape();
+}
+Shape operator+(const Shape& a, const Shape& b) { return BRepAlgoAPI_Fuse(a, b).Shape(); }
+Shape operator-(const Shape& a, const Shape& b) { return BRepAlgoAPI_Cut(a, b).Shape(); }
+Shape Moved(const Shape& shape, double x, double y, double z) {
+  gp_Trsf move;
+  move.SetTranslation(gp_Vec(x, y, z));
+  return BRepBuilderAPI_Transform(shape, move, true).Shape();
+}
+Shape Turned(const Shape& shape, const gp_Dir& axis, double degrees) {
+  gp_Trsf turn;
+  turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), axis), degrees * kPi / 180);
+  return BRepBuilderAPI_Transform(shape, turn, true).Shape();
+}
+
+struct Pair {
+  Shape tool;
+  Shape target;
+};
+
+/// A regular polygon by the distance of its sides.
+Points Regular(int sides, double across_flats) {
+  Points points;
+  const double radius = across_flats / 2 / std::cos(kPi / sides);
+  for (int k = 0; k < sides; ++k) points.emplace_back(radius * std::cos(2 * kPi * (k + 0.5) / sides), radius * std::sin(2 * kPi * (k + 0.5) / sides));
+  return points;
+}
+
+Pair Keyed() {
+  const double c = 0.15;
+  return {Block(20, 10, 0, 50) + Box3(-1.5, 1.5, 4, 6.5, 0, 20),
+          Block(40, 32, -20, 0) - (Block(20 + 2 * c, 10 + 2 * c, -12, 1) + Box3(-1.5 - c, 1.5 + c, 4, 6.5 + c, -12, 1))};
+}
+
+Pair DPlug() {
+  const double c = 0.12;
+  return {Rod(0, 0, 6, 0, 50) - Box3(4, 10, -10, 10, -1, 60), Block(30, 30, -16, 0) - (Rod(0, 0, 6 + c, -10, 1) - Box3(4 + c, 10, -10, 10, -11, 2))};
+}
+
+Pair UsbA() {
+  // Shell of 12 x 4.5 mm, open at the tip; a plastic block fills its upper half.
+  const Shape tool = (Block(12, 4.5, 0, 12) - Block(11.4, 3.9, -1, 12)) + Box3(-5.7, 5.7, 0.1, 1.95, 0.5, 12) + Block(15.7, 8, 12, 52);
+  // The port: a cavity with a tongue in its lower half.
+  const Shape target = (Block(22, 14, -18, 0) - Block(12.4, 4.9, -12.5, 1)) + Box3(-5.4, 5.4, -1.65, -0.2, -12.5, -0.5);
+  return {tool, target};
+}
+
+Pair Rj45() {
+  // The latch: a tongue along the plug's back, at an angle.
+  const Points side{{4.0, 2}, {4.6, 2}, {7.0, 14}, {6.4, 15}, {4.0, 15}};
+  Shape latch = Turned(Prism(side, -3.0, 3.0), gp_Dir(1, 0, 0), 90);  // (y of the profile is z)
+  latch = Turned(latch, gp_Dir(0, 0, 1), 90);
+  const Shape tool = Block(11.6, 8.2, 0, 21) + latch + Box3(-5.8, 5.8, -4.1, 4.1, 20, 55);
+  const double c = 0.13;
+  const Shape target = Block(18, 20, -16, 0) - (Box3(-5.8 - c, 5.8 + c, -4.1 - c, 4.1 + c, -14, 1) + Box3(-3.0 - c, 3.0 + c, 4, 7.0 + c, -14, 1));
+  return {tool, target};
+}
+
+Pair TwoPin() {
+  const double c = 0.2;
+  return {Rod(-9.25, 0, 2, 0, 20) + Rod(9.25, 0, 2, 0, 20) + Block(34, 14, 19, 55),
+          Block(46, 24, -25, 0) - (Rod(-9.25, 0, 2 + c, -19, 1) + Rod(9.25, 0, 2 + c, -19, 1))};
+}
+
+Pair ThreePin() {
+  const double c = 0.2;
+  const auto pins = [](double grow, double z0, double z1, double earth) {
+    return Box3(-11.1 - 3.2 - grow, -11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) + Box3(11.1 - 3.2 - grow, 11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
+           Box3(-2 - grow, 2 + grow, 22.2 - 4 - grow, 22.2 + 4 + grow, earth, z1);
+  };
+  return {pins(0, 0, 19, -4) + Box3(-22, 22, -10, 34, 18, 55), Box3(-32, 32, -20, 44, -30, 0) - pins(c, -18, 1, -22)};
+}
+
+Pair Gear() {
+  Points teeth;
+  const int count = 20;
+  for (int k = 0; k < count; ++k) {
+    for (const auto& [share, radius] : {std::pair{0.0, 13.0}, {0.22, 13.0}, {0.36, 15.6}, {0.6, 15.6}, {0.78, 13.0}}) {
+      const double a = 2 * kPi * (k + share) / count;
+      if (share == 0.0 && k > 0) continue;
+      teeth.emplace_back(radius * std::cos(a), radius * std::sin(a));
+    }
+  }
+  return {Prism(teeth, 0, 10) - Rod(0, 0, 4.1, -1, 11), Block(60, 60, -8, 0) + Rod(0, 0, 4, -1, 18)};
+}
+
+Pair HexSocket() {
+  return {Rod(0, 0, 8.5, 0, 60) - Prism(Regular(6, 10.2), -1, 8), Prism(Regular(6, 10.0), 0, 6.5) + Rod(0, 0, 3, -25, 0.5) + Block(40, 40, -30, -20)};
+}
+
+Pair Taper() { return {Cone(6.0, 7.5, 0, 30) + Rod(0, 0, 7.5, 30, 60), Block(34, 34, -32, 0) - Cone(6.1, 7.6, -30, 0)}; }
+
+Pair Rectangle(double c) { return {Block(8, 7, 0, 50), Block(25, 25, 0, 9) - Block(8 + 2 * c, 7 + 2 * c, -1, 10)}; }
+
+Pair Tilted() {
+  const Pair upright = Rectangle(0.1);
+  const gp_Dir axis(1, 2, 0.5);
+  return {Turned(upright.tool, gp_Dir(0, 1, 0), 35), Moved(Turned(upright.target, axis, 20), 3, -5, 40)};
+}
+
+Pair Assembled() {
+  const Pair keyed = Keyed();
+  return {Moved(keyed.tool, 30, 20, 5 - 12), Moved(keyed.target, 30, 20, 5)};
+}
+
+Pair TwoMouths() {
+  const double c = 0.1;
+  return {Block(8, 7, 0, 50), Block(60, 25, -12, 0) - (Box3(-15 - 4 - c, -15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1) + Box3(15 - 4 - c, 15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1))};
+}
+
+Pair Draw(const std::string& kind) {
+  static const std::vector<std::pair<std::string, std::function<Pair()>>> kKinds = {
+      {"keyed", Keyed},      {"d-plug", DPlug},         {"usb-a", UsbA},         {"rj45", Rj45},
+      {"two-pin", TwoPin},   {"three-pin", ThreePin},   {"gear", Gear},          {"hex-socket", HexSocket},
+      {"taper", Taper},      {"rectangle", [] { return Rectangle(0.1); }},       {"tilted", Tilted},
+      {"assembly", Assembled}, {"two-mouths", TwoMouths}, {"too-large", [] { return Rectangle(-0.13); }}};
+  for (const auto& [name, draw] : kKinds) {
+    if (name == kind) return draw();
+  }
+  throw std::invalid_argument("no kind of parts is called " + kind);
+}
+
+TriangleMesh Triangles(const Shape& shape) {
+  BRepMesh_IncrementalMesh(shape, 0.002, Standard_False, 0.1, Standard_False);
+  TriangleMesh mesh;
+  for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next()) {
+    const TopoDS_Face& face = TopoDS::Face(faces.Current());
+    TopLoc_Location location;
+    const Handle(Poly_Triangulation) part = BRep_Tool::Triangulation(face, location);
+    const int offset = static_cast<int>(mesh.points.size());
+    for (int i = 1; i <= part->NbNodes(); ++i) {
+      const gp_Pnt p = part->Node(i).Transformed(location.Transformation());
+      mesh.points.emplace_back(p.X(), p.Y(), p.Z());
+    }
+    for (int i = 1; i <= part->NbTriangles(); ++i) {
+      int a = 0;
+      int b = 0;
+      int c = 0;
+      part->Triangle(i).Get(a, b, c);
+      if (face.Orientation() == TopAbs_REVERSED) std::swap(b, c);
+      mesh.triangles.push_back({offset + a - 1, offset + b - 1, offset + c - 1});
+    }
+  }
+  return mesh;
+}
+
+void WriteStep(const Shape& shape, const std::filesystem::path& file) {
+  Message::DefaultMessenger()->ChangePrinters().Clear();
+  STEPControl_Writer writer;
+  writer.Transfer(shape, STEPControl_AsIs);
+  if (writer.Write(file.c_str()) != IFSelect_RetDone) throw std::runtime_error("cannot write " + file.string());
+}
+
+void WriteStl(const Shape& shape, const std::filesystem::path& file, bool ascii) {
+  const TriangleMesh mesh = Triangles(shape);
+  std::ofstream out(file, std::ios::binary);
+  if (!ascii) {
+    out << StlBytes(mesh);
+    return;
+  }
+  out << "solid part\n";
+  for (int t = 0; t < mesh.size(); ++t) {
+    out << "facet normal 0 0 0\n outer loop\n";
+    for (int k = 0; k < 3; ++k) out << "  vertex " << mesh.Corner(t, k).x() << ' ' << mesh.Corner(t, k).y() << ' ' << mesh.Corner(t, k).z() << '\n';
+    out << " endloop\nendfacet\n";
+  }
+  out << "endsolid part\n";
+}
+
+}  // namespace
+
+std::vector<PartKind> PartKinds() {
+  return {{"keyed", 0.15, 0.15, 12.0},       {"d-plug", 0.12, 0.12, 10.0},  {"usb-a", 0.2, 0.2, 12.0},
+          {"rj45", 0.13, 0.13, 14.0},        {"two-pin", 0.2, 0.2, 19.0},   {"three-pin", 0.2, 0.2, 18.0},
+          {"gear", 0.1, 0.1, 0.0, true},     {"hex-socket", 0.1, 0.1, 6.5, true}, {"taper", 0.0, 0.0, 0.0},
+          {"tilted", 0.1, 0.1, 9.0},         {"assembly", 0.15, 0.15, 12.0, false, true}};
+}
+
+PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format) {
+  const Pair pair = Draw(kind);
+  std::filesystem::create_directories(folder);
+  if (format == "assembly") {
+    BRep_Builder builder;
+    TopoDS_Compound both;
+    builder.MakeCompound(both);
+    builder.Add(both, pair.tool);
+    builder.Add(both, pair.target);
+    const std::string file = (folder / (kind + ".step")).string();
+    WriteStep(both, file);
+    return {file + "#1", file + "#2"};
+  }
+  const std::string extension = format == "step" ? ".step" : ".stl";
+  const std::filesystem::path tool = folder / (kind + "_tool" + extension);
+  const std::filesystem::path target = folder / (kind + "_target" + extension);
+  for (const auto& [shape, file] : {std::pair{pair.tool, tool}, {pair.target, target}}) {
+    if (format == "step") {
+      WriteStep(shape, file);
+    } else {
+      WriteStl(shape, file, format == "stl-ascii");
+    }
+  }
+  return {tool.string(), target.string()};
+}
+
+}  // namespace feeler::cad
