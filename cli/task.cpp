@@ -220,7 +220,8 @@ void AddTaskCommand(CLI::App& app, Session& session) {
   show->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
   show->add_flag("--json", flags->json, "print JSON");
   show->callback([flags] { Show(*flags); });
-  CLI::App* render = task->add_subcommand("render", "A picture of a task: at the start pose, cut open, or into the mouth");
+  CLI::App* render =
+      task->add_subcommand("render", "A picture of a task: at the start pose, cut open, or into the mouth");
   render->add_option("task", flags->task, "name, or path of a task file")->required();
   render->add_option("--view", flags->view, "overview, close-up, section (cut open) or mouth (into the opening)")
       ->capture_default_str();

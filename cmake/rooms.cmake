@@ -43,6 +43,7 @@ endfunction()
 # feeler_tests(ROOM): executable ROOM_tests from tests/ROOM/*.cpp, each test registered with ctest.
 function(feeler_tests room)  # the tests of `cli` run the binary
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${room}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/tests/cad/kinds/")  # feeler::part_shapes
   if(NOT sources)
     return()
   endif()
@@ -122,7 +123,8 @@ add_library(feeler::qhull ALIAS feeler_qhull)
 add_library(feeler_opencascade INTERFACE)
 find_path(OPENCASCADE_INCLUDE_DIR STEPControl_Reader.hxx PATH_SUFFIXES opencascade REQUIRED)
 target_include_directories(feeler_opencascade SYSTEM INTERFACE ${OPENCASCADE_INCLUDE_DIR})
-foreach(module TKSTEP TKSTEPBase TKXSBase TKMesh TKShHealing TKTopAlgo TKBRep TKG3d TKMath TKernel)
+foreach(module TKSTEP TKSTEPBase TKXSBase TKMesh TKShHealing TKBO TKPrim TKTopAlgo TKGeomAlgo TKBRep TKGeomBase TKG3d TKG2d TKMath
+        TKernel)
   find_library(OPENCASCADE_${module}_LIBRARY ${module} REQUIRED)
   target_link_libraries(feeler_opencascade INTERFACE ${OPENCASCADE_${module}_LIBRARY})
 endforeach()

@@ -51,7 +51,21 @@ struct Found {
   Eigen::Vector3d offset;
   double engaged_m;
   double slack_m;
+  double engaged_m3 = 0.0;  ///< of material in the other part's holes: of two pins both count
 };
+
+/// Area of the loops around material of one section that lie in holes of the other.
+double AreaInHoles(const std::vector<SlabLoop>& inside, const std::vector<SlabLoop>& around) {
+  double area = 0;
+  for (const SlabLoop& loop : inside) {
+    if (SignedArea(loop) < 0) continue;
+    const bool held = std::any_of(around.begin(), around.end(), [&](const SlabLoop& hole) {
+      return SignedArea(hole) < 0 && Encloses(hole, loop.front().middle);
+    });
+    if (held) area += SignedArea(loop);
+  }
+  return area;
+}
 
 Eigen::Matrix3d Roll(double angle) {
   Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -71,10 +85,26 @@ Turned TurnedPart(const TriangleMesh& mesh, const Eigen::Matrix3d& rotation) {
   return part;
 }
 
-Eigen::AlignedBox2d RolledBounds(const SlabLoop& loop, double roll) {
+/// `with_ends`: of the whole slab, not of its middle alone.
+Eigen::AlignedBox2d RolledBounds(const SlabLoop& loop, double roll, bool with_ends = false) {
   const Eigen::Rotation2Dd rotation(roll);
   Eigen::AlignedBox2d box;
-  for (const SlabPoint& p : loop) box.extend(rotation * p.middle);
+  for (const SlabPoint& p : loop) {
+    box.extend(rotation * p.middle);
+    if (!with_ends) continue;
+    box.extend(rotation * p.low);
+    box.extend(rotation * p.high);
+  }
+  return box;
+}
+
+/// The box around all material up to the upper end of a feature: where the tip is narrower than what follows (a latch),
+/// it is this that has to come into the hole.
+Eigen::AlignedBox2d TipBounds(const std::vector<Feature>& features, const Feature& upto, double roll) {
+  Eigen::AlignedBox2d box;
+  for (const Feature& feature : features) {
+    if (!feature.hole && feature.low_m < upto.high_m - 1e-9) box.extend(RolledBounds(feature.loop, roll, true));
+  }
   return box;
 }
 
@@ -117,8 +147,14 @@ void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targ
               if (std::max(too_wide, 0.0) < miss.too_wide_m && fit > 0.6) miss = {std::max(too_wide, 0.0), inner, hole};
               continue;
             }
-            trials.push_back({a, b, roll, target_box.center() - tool_box.center(), f.hole, g.high_m, g.low_m,
-                              inner.minCoeff(), fit});
+            const auto add = [&](const Eigen::Vector2d& place) {
+              trials.push_back({a, b, roll, place, f.hole, g.high_m, g.low_m, inner.minCoeff(), fit});
+            };
+            add(target_box.center() - tool_box.center());
+            if (f.hole) continue;
+            const Eigen::AlignedBox2d tip = TipBounds(tools[a].features, f, roll);
+            if ((tip.sizes() - hole).maxCoeff() > 0 || (tip.center() - tool_box.center()).norm() < 1e-5) continue;
+            add(target_box.center() - tip.center());
           }
         }
       }
@@ -177,6 +213,13 @@ std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const
   const double bottom = std::min(found.offset.z() - (trial.low_m - tool_box.min().z()), rest);
   found.offset.z() -= rest < through ? rest : std::max(bottom, 0.0);
   found.engaged_m = trial.high_m - (tool_box.min().z() + found.offset.z());
+  const double middle = trial.high_m - 0.5 * found.engaged_m;
+  TriangleMesh in = tool;
+  for (Eigen::Vector3d& point : in.points) point += found.offset;
+  const std::vector<SlabLoop> tool_section = SectionAt(in, middle);
+  const std::vector<SlabLoop> target_section = SectionAt(target.mesh, middle);
+  found.engaged_m3 =
+      found.engaged_m * (AreaInHoles(tool_section, target_section) + AreaInHoles(target_section, tool_section));
   return found;
 }
 
@@ -246,6 +289,10 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
     }
   }
   if (found.empty()) NoFit(miss, true);
+  // What has little in the other part's holes went there by chance.
+  double most = 0;
+  for (const Found& f : found) most = std::max(most, f.engaged_m3);
+  std::erase_if(found, [&](const Found& f) { return f.engaged_m3 < 0.7 * most; });
   // The tightest fit; of equals the deepest; of equals that nearest to the CAD frames.
   const auto tightest = *std::min_element(found.begin(), found.end(),
                                           [](const Found& a, const Found& b) { return a.slack_m < b.slack_m; });

@@ -13,6 +13,7 @@ constexpr double kSameDirection = 0.99996;  // cosine of half a degree
 constexpr std::size_t kMostNormals = 8;
 constexpr double kLeastShare = 0.02;  ///< of the surface, for a normal to count
 constexpr std::size_t kMostSlabs = 24;
+constexpr std::size_t kMostLevels = 200;
 
 void Dominant(Feature& feature) {
   constexpr int kBins = 360;
@@ -96,17 +97,47 @@ Eigen::Matrix3d RotationToZ(const Eigen::Vector3d& direction) {
   return rotation;
 }
 
-std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
-  const std::vector<double> levels = LevelsOf(mesh, 2e-6);
+namespace {
+
+/// The slabs that are looked at: all of them, or, of a free form with very many levels, the thickest.
+std::vector<std::size_t> SlabsToLookAt(const std::vector<double>& levels) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i + 1 < levels.size(); ++i) order.push_back(i);
+  if (order.size() <= kMostLevels) return order;
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return levels[a + 1] - levels[a] > levels[b + 1] - levels[b] + 1e-9;
   });
-  if (order.size() > kMostSlabs) order.resize(kMostSlabs);
+  order.resize(kMostSlabs);
   std::sort(order.begin(), order.end());
-  std::vector<Feature> features;
-  for (const std::size_t i : order) {
+  return order;
+}
+
+/// Whether the area grows or shrinks from the lower end of the slab to the upper.
+bool Tapers(const SlabLoop& loop) {
+  SlabLoop low = loop;
+  SlabLoop high = loop;
+  for (SlabPoint& p : low) p.middle = p.low;
+  for (SlabPoint& p : high) p.middle = p.high;
+  return std::abs(SignedArea(high) - SignedArea(low)) > 1e-4 * std::abs(SignedArea(loop));
+}
+
+/// A line that goes on into the next slab, as of a prism or a taper.
+bool GoesOn(const Feature& below, const Feature& above) {
+  if (below.hole != above.hole || std::abs(below.high_m - above.low_m) > 1e-9) return false;
+  if (std::abs(below.area - above.area) > 0.03 * std::max(below.area, above.area)) return false;
+  if (Tapers(below.loop) != Tapers(above.loop)) return false;
+  const Eigen::AlignedBox2d a = BoundsOf(below.loop);
+  const Eigen::AlignedBox2d b = BoundsOf(above.loop);
+  return (a.center() - b.center()).norm() < 0.02 * a.sizes().maxCoeff();
+}
+
+}  // namespace
+
+std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
+  const std::vector<double> levels = LevelsOf(mesh, 2e-6);
+  // Chains of lines that go on from slab to slab; each is one feature, with the line in its middle.
+  std::vector<std::vector<Feature>> chains;
+  for (const std::size_t i : SlabsToLookAt(levels)) {
     for (const SlabLoop& raw : SlabBetween(mesh, levels[i], levels[i + 1]).loops) {
       Feature feature;
       feature.loop = Simplified(raw, [](const SlabPoint&) { return 1e-6; });
@@ -116,20 +147,25 @@ std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
       feature.low_m = levels[i];
       feature.high_m = levels[i + 1];
       if (feature.area < 1e-8) continue;  // a tenth of a millimetre across
-      // The same line, further up: one feature.
-      bool again = false;
-      for (Feature& known : features) {
-        if (known.hole != feature.hole || std::abs(known.high_m - feature.low_m) > 1e-9) continue;
-        if (std::abs(known.area - feature.area) > 1e-4 * feature.area) continue;
-        if ((BoundsOf(known.loop).center() - BoundsOf(feature.loop).center()).norm() > 1e-5) continue;
-        known.high_m = feature.high_m;
-        again = true;
-        break;
+      const auto chain =
+          std::find_if(chains.begin(), chains.end(), [&](const auto& known) { return GoesOn(known.back(), feature); });
+      if (chain == chains.end()) {
+        chains.push_back({std::move(feature)});
+      } else {
+        chain->push_back(std::move(feature));
       }
-      if (again) continue;
-      Dominant(feature);
-      features.push_back(std::move(feature));
     }
+  }
+  std::vector<Feature> features;
+  for (const std::vector<Feature>& chain : chains) {
+    const double middle = 0.5 * (chain.front().low_m + chain.back().high_m);
+    const auto at =
+        std::find_if(chain.begin(), chain.end(), [&](const Feature& f) { return f.high_m >= middle - 1e-12; });
+    Feature feature = *at;
+    feature.low_m = chain.front().low_m;
+    feature.high_m = chain.back().high_m;
+    Dominant(feature);
+    features.push_back(std::move(feature));
   }
   return features;
 }

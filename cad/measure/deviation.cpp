@@ -59,8 +59,8 @@ bool SurfaceCuts(const MeshTree& part, const std::array<Eigen::Vector3d, 3>& pat
   return cuts;
 }
 
-/// A face of a piece, moved inward by `depth_m` and away from the other faces by as much: so that a face that lies on the
-/// surface of the part, or ends at it, does not cut it.
+/// A face of a piece, moved inward by `depth_m` and away from the other faces by as much: so that a face that lies on
+/// the surface of the part, or ends at it, does not cut it.
 Polygon3 Shrunk(const ConvexPiece& piece, int triangle, double depth_m) {
   const Eigen::Vector3d area = AreaVector(piece.surface, triangle);
   if (area.norm() < 1e-16) return {};
@@ -76,7 +76,8 @@ Polygon3 Shrunk(const ConvexPiece& piece, int triangle, double depth_m) {
 }
 
 /// The farthest that the faces of the pieces stand out of the part.
-Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone, double accuracy_m) {
+Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
+           double accuracy_m) {
   Best best;
   std::priority_queue<Patch> queue;
   const auto judge = [&](Patch patch) {
@@ -135,9 +136,11 @@ std::vector<Polygon3> Uncovered(const Polygon3& triangle, const std::vector<Conv
   return rest;
 }
 
-/// The farthest that the part's surface is from the pieces. The distance to a convex piece is a convex function, so that on
-/// a patch the largest distance to the union is at most the smallest, over the pieces, of the largest at its corners.
-Best Lost(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone, double accuracy_m) {
+/// The farthest that the part's surface is from the pieces. The distance to a convex piece is a convex function, so
+/// that on a patch the largest distance to the union is at most the smallest, over the pieces, of the largest at its
+/// corners.
+Best Lost(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
+          double accuracy_m) {
   Best best;
   std::priority_queue<Patch> queue;
   std::vector<const ConvexPiece*> all;

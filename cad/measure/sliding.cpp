@@ -100,7 +100,8 @@ double MeshSlide::TravelUpTo(const Eigen::Vector3d& offset_m, const Eigen::Vecto
     if (!reach.intersects(box)) continue;
     target_.Visit(box, [&](int t) {
       const TriangleMesh& mesh = target_.mesh();
-      travel = std::min(travel, PairTravel(corners, {mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)}, direction));
+      travel =
+          std::min(travel, PairTravel(corners, {mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)}, direction));
       return travel > 0;
     });
     if (travel <= 0) return 0;

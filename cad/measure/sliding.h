@@ -9,8 +9,8 @@
 
 namespace feeler::cad {
 
-/// Slides one mesh against another: exactly, for two surfaces of triangles first touch corner on face, face on corner or
-/// edge on edge. Both meshes must outlive it. Immutable; shared by threads.
+/// Slides one mesh against another: exactly, for two surfaces of triangles first touch corner on face, face on corner
+/// or edge on edge. Both meshes must outlive it. Immutable; shared by threads.
 class MeshSlide {
  public:
   MeshSlide(const TriangleMesh& tool, const MeshTree& target) : tool_(tool), target_(target) {}

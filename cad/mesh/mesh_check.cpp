@@ -49,7 +49,8 @@ std::map<Edge, int> UnmatchedAfterSplitting(const TriangleMesh& mesh, const std:
   }
   std::vector<int> by_x(ends.begin(), ends.end());
   const auto point = [&](int i) -> const Eigen::Vector3d& { return mesh.points[static_cast<std::size_t>(i)]; };
-  std::sort(by_x.begin(), by_x.end(), [&](int a, int b) { return std::pair(point(a).x(), a) < std::pair(point(b).x(), b); });
+  std::sort(by_x.begin(), by_x.end(),
+            [&](int a, int b) { return std::pair(point(a).x(), a) < std::pair(point(b).x(), b); });
   std::map<Edge, int> rest;
   for (const auto& [edge, count] : unmatched) {
     const Eigen::Vector3d& a = point(edge.first);
@@ -188,10 +189,11 @@ void RequireClosed(const TriangleMesh& mesh, const std::string& where, CheckedPa
     }
   }
   if (longest > 4 * kWeld_m) {
-    throw InputError(where,
-                     fmt::format("the surface is open: {:.2f} mm of edges have a triangle on one side only, the longest at {}",
-                                 1000 * length, Place(place)),
-                     "close it in your CAD program, or export it as a solid");
+    throw InputError(
+        where,
+        fmt::format("the surface is open: {:.2f} mm of edges have a triangle on one side only, the longest at {}",
+                    1000 * length, Place(place)),
+        "close it in your CAD program, or export it as a solid");
   }
   part.mended.push_back(fmt::format("{} long edges meet several short ones: taken for closed", unmatched.size()));
 }

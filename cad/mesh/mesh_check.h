@@ -9,7 +9,7 @@ namespace feeler::cad {
 
 /// A part whose surface was checked, and mended where that cannot change its shape.
 struct CheckedPart {
-  TriangleMesh mesh;               ///< all shells, closed, seen from outside
+  TriangleMesh mesh;                 ///< all shells, closed, seen from outside
   std::vector<TriangleMesh> solids;  ///< a mesh for each solid, hollows included
   std::vector<std::string> mended;   ///< what was done, a sentence each
   std::vector<std::string> noted;    ///< what was found and left

@@ -11,8 +11,8 @@ namespace feeler::cad {
 
 /// A surface of triangles. Seen from outside, the corners of a triangle run counterclockwise.
 struct TriangleMesh {
-  std::vector<Eigen::Vector3d> points;         ///< m
-  std::vector<std::array<int, 3>> triangles;   ///< indices into `points`
+  std::vector<Eigen::Vector3d> points;        ///< m
+  std::vector<std::array<int, 3>> triangles;  ///< indices into `points`
 
   const Eigen::Vector3d& Corner(int triangle, int k) const {
     return points[static_cast<std::size_t>(triangles[static_cast<std::size_t>(triangle)][static_cast<std::size_t>(k)])];

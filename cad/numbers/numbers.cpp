@@ -61,7 +61,8 @@ CellChoice ChooseCell(const Walls& walls, const Eigen::Vector3d& uncertainty_m) 
     if (std::ceil(2 * uncertainty_m.maxCoeff() / cell - 1e-9) > kMostCells) continue;
     const double margin = MarginAt(walls, cell);
     if (margin > best.margin + 1e-9) best = {cell, margin, 0};
-    if (margin >= kComfortable && margin * cell > most_room.margin * most_room.cell_m + 1e-12) most_room = {cell, margin, 0};
+    if (margin >= kComfortable && margin * cell > most_room.margin * most_room.cell_m + 1e-12)
+      most_room = {cell, margin, 0};
   }
   CellChoice choice = most_room.cell_m > 0 ? most_room : best;
   if (choice.cell_m == 0) {
@@ -127,11 +128,10 @@ class Derivation {
     const std::string widths = fmt::format("+-({}) mm", Plain(Eigen::Vector3d(options_.uncertainty_m * 1000)));
     Add("feeler_axes", true, axes, fmt::format("position uncertain by {} along x, y, z, {}", widths, given));
     const CellChoice choice = ChooseCell(walls_, options_.uncertainty_m);
-    const std::string cell = Add(
-        "feeler_resolution", false, Repeated(Plain(choice.cell_m), uncertain_.size()),
-        fmt::format(
-            "scanned from 0.5 to 2 mm: the cell whose walls stay farthest from lattice planes, {:.2f} cells (best margin {:.2f})",
-            choice.margin, choice.best_margin));
+    const std::string cell = Add("feeler_resolution", false, Repeated(Plain(choice.cell_m), uncertain_.size()),
+                                 fmt::format("scanned from 0.5 to 2 mm: the cell whose walls stay farthest from "
+                                             "lattice planes, {:.2f} cells (best margin {:.2f})",
+                                             choice.margin, choice.best_margin));
     result_.cell_m = First(cell);
     if (!(result_.cell_m > 0))
       throw InputError("--set feeler_resolution", "is not positive", "give metres, e.g. 0.001");

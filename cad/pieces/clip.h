@@ -9,7 +9,8 @@ namespace feeler::cad {
 
 using Polygon3 = std::vector<Eigen::Vector3d>;
 
-/// The part of a planar convex polygon with normal . x <= offset; empty when nothing, or no more than a corner, is left.
+/// The part of a planar convex polygon with normal . x <= offset; empty when nothing, or no more than a corner, is
+/// left.
 Polygon3 Clip(const Polygon3& polygon, const Eigen::Vector3d& normal, double offset_m);
 /// The part of it within a piece whose planes are all moved outward by `grow_m`.
 Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m);

@@ -23,7 +23,8 @@ struct CloseFile {
 };
 
 /// Facets of the hull as triples of input points, and their planes (unscaled); false when the points are flat.
-bool RunQhull(std::vector<double>& coordinates, std::vector<std::array<int, 3>>& triangles, std::vector<HalfSpace>& planes) {
+bool RunQhull(std::vector<double>& coordinates, std::vector<std::array<int, 3>>& triangles,
+              std::vector<HalfSpace>& planes) {
   const std::unique_ptr<std::FILE, CloseFile> silence(std::fopen("/dev/null", "w"));
   qhT context;
   qhT* qh = &context;
@@ -59,7 +60,8 @@ std::vector<HalfSpace> Distinct(const std::vector<HalfSpace>& planes) {
   for (const HalfSpace& plane : planes) {
     bool known = false;
     for (HalfSpace& other : distinct) {
-      if ((other.normal - plane.normal).squaredNorm() > 1e-18 || std::abs(other.offset_m - plane.offset_m) > 1e-9) continue;
+      if ((other.normal - plane.normal).squaredNorm() > 1e-18 || std::abs(other.offset_m - plane.offset_m) > 1e-9)
+        continue;
       other.offset_m = std::max(other.offset_m, plane.offset_m);
       known = true;
       break;

@@ -17,9 +17,9 @@ struct HalfSpace {
 
 /// A convex body: what MuJoCo takes for a mesh geom.
 struct ConvexPiece {
-  TriangleMesh surface;            ///< its hull, seen from outside
-  std::vector<HalfSpace> planes;   ///< one for each face; triangles of one face share theirs
-  double volume = 0.0;             ///< m^3
+  TriangleMesh surface;           ///< its hull, seen from outside
+  std::vector<HalfSpace> planes;  ///< one for each face; triangles of one face share theirs
+  double volume = 0.0;            ///< m^3
   Box bounds;
 };
 

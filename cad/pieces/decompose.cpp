@@ -63,18 +63,21 @@ bool IsPrism(const Slab& slab) {
 bool SameLoop(const SlabLoop& a, const SlabLoop& b, double tolerance_m) {
   if (a.size() != b.size()) return false;
   return std::all_of(a.begin(), a.end(), [&](const SlabPoint& p) {
-    return std::any_of(b.begin(), b.end(), [&](const SlabPoint& q) { return (p.middle - q.middle).norm() <= tolerance_m; });
+    return std::any_of(b.begin(), b.end(),
+                       [&](const SlabPoint& q) { return (p.middle - q.middle).norm() <= tolerance_m; });
   });
 }
 
 bool SameSection(const Slab& a, const Slab& b, double tolerance_m) {
   if (a.loops.size() != b.loops.size()) return false;
   return std::all_of(a.loops.begin(), a.loops.end(), [&](const SlabLoop& loop) {
-    return std::any_of(b.loops.begin(), b.loops.end(), [&](const SlabLoop& other) { return SameLoop(loop, other, tolerance_m); });
+    return std::any_of(b.loops.begin(), b.loops.end(),
+                       [&](const SlabLoop& other) { return SameLoop(loop, other, tolerance_m); });
   });
 }
 
-/// The slabs of a solid, simplified within half of the tolerances; prisms of one cross-section that follow each other are one.
+/// The slabs of a solid, simplified within half of the tolerances; prisms of one cross-section that follow each other
+/// are one.
 std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& options) {
   const std::vector<double> levels = SlabLevels(solid, options.most_slabs);
   std::vector<Slab> slabs;
@@ -86,7 +89,8 @@ std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& opt
       SlabLoop simple = Simplified(loop, [&](const SlabPoint& p) {
         return 0.5 * ToleranceAt(options, {p.middle.x(), p.middle.y(), height});
       });
-      if (simple.size() >= 3 && std::abs(SignedArea(simple)) > kSliver_m * kSliver_m) loops.push_back(std::move(simple));
+      if (simple.size() >= 3 && std::abs(SignedArea(simple)) > kSliver_m * kSliver_m)
+        loops.push_back(std::move(simple));
     }
     slab.loops = std::move(loops);
     if (!slabs.empty() && IsPrism(slab) && IsPrism(slabs.back()) && SameSection(slab, slabs.back(), 2 * kLevel_m)) {
@@ -155,7 +159,8 @@ class Merger {
     bool any = false;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
       for (std::size_t j = i + 1; j < pieces_.size();) {
-        if (Near(pieces_[i].bounds, pieces_[j].bounds) && ColumnShare(pieces_[i].bounds, pieces_[j].bounds) >= least_share && Unite(i, j)) {
+        if (Near(pieces_[i].bounds, pieces_[j].bounds) &&
+            ColumnShare(pieces_[i].bounds, pieces_[j].bounds) >= least_share && Unite(i, j)) {
           any = true;
           j = i + 1;
         } else {
@@ -175,7 +180,8 @@ class Merger {
     auto hull = HullOf(points);
     if (!hull) return false;
     const double more = hull->volume - a.volume - b.volume;
-    const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull->surface) + 2e-3 * (a.volume + b.volume);
+    const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull->surface) +
+                           2e-3 * (a.volume + b.volume);
     if (more > allowed || !StaysInside(*hull, solid_, options_)) return false;
     pieces_[i] = std::move(*hull);
     pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(j));

@@ -9,15 +9,15 @@
 namespace feeler::cad {
 
 struct DecomposeOptions {
-  Box mating;                       ///< where tool and target mate; the slabs are cut across z
-  double tolerance_near_m = 1e-6;   ///< of the surface in the box
-  double tolerance_far_m = 1e-6;    ///< elsewhere
-  int most_slabs = 160;             ///< beyond it, slabs of a free form are drawn together
+  Box mating;                      ///< where tool and target mate; the slabs are cut across z
+  double tolerance_near_m = 1e-6;  ///< of the surface in the box
+  double tolerance_far_m = 1e-6;   ///< elsewhere
+  int most_slabs = 160;            ///< beyond it, slabs of a free form are drawn together
 };
 
-/// A solid as convex bodies whose union is the solid: the part is sliced along z at the heights of its corners, each slice
-/// is cut into convex polygons (cad/section/convex_partition.h), and the bodies over them are united as long as the
-/// convex hull of two stays in the solid, within the tolerances. Exact for prisms, bores, tapers and rings along z.
+/// A solid as convex bodies whose union is the solid: the part is sliced along z at the heights of its corners, each
+/// slice is cut into convex polygons (cad/section/convex_partition.h), and the bodies over them are united as long as
+/// the convex hull of two stays in the solid, within the tolerances. Exact for prisms, bores, tapers and rings along z.
 /// Same input, same pieces, bit for bit.
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options);
 

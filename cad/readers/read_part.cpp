@@ -2,6 +2,7 @@
 
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -11,8 +12,6 @@
 #include <cstring>
 #include <fstream>
 #include <string_view>
-
-#include <fmt/format.h>
 
 #include "feeler/core/error.h"
 
@@ -123,7 +122,8 @@ RawPart ReadAsciiStl(const fs::path& file) {
       Eigen::Vector3d p;
       for (int k = 0; k < 3; ++k) {
         if (!NextNumber(rest, p[k])) {
-          throw InputError(fmt::format("{}:{}", file.string(), number), "a vertex has not three numbers", "export it again");
+          throw InputError(fmt::format("{}:{}", file.string(), number), "a vertex has not three numbers",
+                           "export it again");
         }
       }
       body.mesh.points.push_back(p);
@@ -186,8 +186,8 @@ RawPart ReadObj(const fs::path& file) {
 RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
-  const aiScene* scene = importer.ReadFile(
-      file.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices);
+  const aiScene* scene =
+      importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices);
   if (scene == nullptr) throw InputError(file.string(), importer.GetErrorString(), "export it again, or as STL");
   RawPart part{format, {}, std::nullopt};
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
@@ -200,8 +200,8 @@ RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices != 3) continue;
-      body.mesh.triangles.push_back({static_cast<int>(face.mIndices[0]), static_cast<int>(face.mIndices[1]),
-                                     static_cast<int>(face.mIndices[2])});
+      body.mesh.triangles.push_back(
+          {static_cast<int>(face.mIndices[0]), static_cast<int>(face.mIndices[1]), static_cast<int>(face.mIndices[2])});
     }
     if (!body.mesh.triangles.empty()) part.bodies.push_back(std::move(body));
   }

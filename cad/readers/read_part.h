@@ -13,7 +13,7 @@ namespace feeler::cad {
 
 /// A unit of length that files come in.
 struct Unit {
-  std::string name;    ///< "mm"
+  std::string name;  ///< "mm"
   double metres = 0.001;
 };
 /// mm, cm, m, in, um. Throws InputError listing them for another name.

@@ -41,9 +41,9 @@ struct Place {
 struct Corner {
   Place place;
   Eigen::Vector2d at;
-  Eigen::Vector2d to_next;      ///< directions, not unit
+  Eigen::Vector2d to_next;  ///< directions, not unit
   Eigen::Vector2d to_previous;
-  double angle = 0.0;           ///< of the material
+  double angle = 0.0;  ///< of the material
 };
 
 Corner CornerAt(const Region& region, std::size_t loop, std::size_t index) {
@@ -131,7 +131,8 @@ class Cutter {
         if (IsReflex(corner, l == 0 ? tolerance_m_ : 0.0)) reflex.push_back(corner);
       }
     }
-    std::stable_sort(reflex.begin(), reflex.end(), [](const Corner& a, const Corner& b) { return a.angle > b.angle + 1e-6; });
+    std::stable_sort(reflex.begin(), reflex.end(),
+                     [](const Corner& a, const Corner& b) { return a.angle > b.angle + 1e-6; });
     // Slivers only where there is nothing better.
     for (const double least_angle : {kLeastAngle, 0.0}) {
       for (const Corner& corner : reflex) {
@@ -144,7 +145,8 @@ class Cutter {
     return false;
   }
 
-  static Cut BestCut(const Region& region, const Corner& corner, const std::vector<Corner>& reflex, double least_angle) {
+  static Cut BestCut(const Region& region, const Corner& corner, const std::vector<Corner>& reflex,
+                     double least_angle) {
     Cut best;
     const double least = std::max(corner.angle - kPi, 0.0);
     const double most = std::min(kPi, corner.angle);
@@ -154,8 +156,7 @@ class Cutter {
       const Hit hit = Shoot(region, corner.at, direction);
       if (!std::isfinite(hit.distance)) continue;
       const double at_end = std::acos(std::clamp(std::abs(direction.dot(hit.side)), 0.0, 1.0));
-      const double score =
-          hit.distance / (Squareness(std::min(angle, corner.angle - angle)) * Squareness(at_end));
+      const double score = hit.distance / (Squareness(std::min(angle, corner.angle - angle)) * Squareness(at_end));
       if (score < best.score * (1 - 1e-9)) best = {Snapped(region, corner, hit, least, most), score};
     }
     std::vector<std::pair<double, const Corner*>> partners;
@@ -175,9 +176,9 @@ class Cutter {
       const double there = Turn(other->to_next, -direction);
       if (std::min(there, other->angle - there) < least_angle) continue;
       const bool both = there >= other->angle - kPi - 1e-9 && there <= kPi + 1e-9;
-      const double score = distance * (both ? 0.5 : 1.0) /
-                           (Squareness(std::min(angle, corner.angle - angle)) *
-                            Squareness(std::min(there, other->angle - there)));
+      const double score =
+          distance * (both ? 0.5 : 1.0) /
+          (Squareness(std::min(angle, corner.angle - angle)) * Squareness(std::min(there, other->angle - there)));
       if (score < best.score * (1 - 1e-9)) best = {other->place, score};
     }
     return best;
@@ -189,8 +190,9 @@ class Cutter {
     for (const std::size_t index : {hit.place.index, (hit.place.index + 1) % loop.size()}) {
       const Corner other = CornerAt(region, hit.place.loop, index);
       const Eigen::Vector2d way = other.at - corner.at;
-      const Eigen::Vector2d end = loop[hit.place.index].middle +
-                                  hit.place.share * (loop[(hit.place.index + 1) % loop.size()].middle - loop[hit.place.index].middle);
+      const Eigen::Vector2d end =
+          loop[hit.place.index].middle +
+          hit.place.share * (loop[(hit.place.index + 1) % loop.size()].middle - loop[hit.place.index].middle);
       const double off = (other.at - end).norm();
       if (off > kTouch_m && off > kSnap * hit.distance) continue;
       if (way.norm() < kTouch_m) continue;
@@ -210,7 +212,9 @@ class Cutter {
   static SlabPoint PointAt(const SlabLoop& loop, const Place& place) {
     const SlabPoint& a = loop[place.index];
     const SlabPoint& b = loop[(place.index + 1) % loop.size()];
-    const auto mix = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) -> Eigen::Vector2d { return p + place.share * (q - p); };
+    const auto mix = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) -> Eigen::Vector2d {
+      return p + place.share * (q - p);
+    };
     return {mix(a.middle, b.middle), mix(a.low, b.low), mix(a.high, b.high)};
   }
 
@@ -281,7 +285,8 @@ class Cutter {
       Region* smallest = nullptr;
       for (Region& region : made) {
         const SlabLoop& around = region.loops.front();
-        if (!Encloses(around, hole.front().middle) && !Encloses(around, 0.5 * (hole[0].middle + hole[1].middle))) continue;
+        if (!Encloses(around, hole.front().middle) && !Encloses(around, 0.5 * (hole[0].middle + hole[1].middle)))
+          continue;
         if (smallest == nullptr || SignedArea(around) < SignedArea(smallest->loops.front())) smallest = &region;
       }
       if (smallest != nullptr) smallest->loops.push_back(std::move(hole));

@@ -34,10 +34,13 @@ std::vector<Segment> SegmentsOf(const TriangleMesh& mesh, double low, double mid
       const int j = t[(k + 1) % 3];
       const Eigen::Vector3d& a = mesh.points[static_cast<std::size_t>(std::min(i, j))];
       const Eigen::Vector3d& b = mesh.points[static_cast<std::size_t>(std::max(i, j))];
-      const bool up = mesh.points[static_cast<std::size_t>(i)].z() < middle && mesh.points[static_cast<std::size_t>(j)].z() > middle;
-      const bool down = mesh.points[static_cast<std::size_t>(i)].z() > middle && mesh.points[static_cast<std::size_t>(j)].z() < middle;
+      const bool up = mesh.points[static_cast<std::size_t>(i)].z() < middle &&
+                      mesh.points[static_cast<std::size_t>(j)].z() > middle;
+      const bool down = mesh.points[static_cast<std::size_t>(i)].z() > middle &&
+                        mesh.points[static_cast<std::size_t>(j)].z() < middle;
       if (!up && !down) continue;
-      const std::uint64_t key = static_cast<std::uint64_t>(std::min(i, j)) << 32 | static_cast<std::uint64_t>(std::max(i, j));
+      const std::uint64_t key =
+          static_cast<std::uint64_t>(std::min(i, j)) << 32 | static_cast<std::uint64_t>(std::max(i, j));
       // Seen from outside, walking with the material on the left leads from the falling edge to the rising one.
       (up ? segment.to : segment.from) = {key, {At(a, b, middle), At(a, b, low), At(a, b, high)}};
       ++found;

@@ -37,14 +37,14 @@ bool IsMaterial(const std::vector<SlabLoop>& loops, const Eigen::Vector2d& point
 /// Heights of the corners of a mesh, increasing; those within `tolerance_m` of each other are one.
 std::vector<double> LevelsOf(const TriangleMesh& mesh, double tolerance_m);
 
-/// The cross-section between two neighbouring levels. Ends that lie within `gap_m` of each other are joined where a long
-/// edge of the mesh meets several short ones.
+/// The cross-section between two neighbouring levels. Ends that lie within `gap_m` of each other are joined where a
+/// long edge of the mesh meets several short ones.
 Slab SlabBetween(const TriangleMesh& mesh, double low_m, double high_m, double gap_m = 2e-5);
 /// The cross-section at a height, as a slab of no thickness.
 std::vector<SlabLoop> SectionAt(const TriangleMesh& mesh, double height_m);
 
-/// Leaves out corners as long as no left-out one is farther than the tolerance from the line that stays, at either end of
-/// the slab and in its middle: first those that lie on a line with their neighbours, then the rest by the scheme of
+/// Leaves out corners as long as no left-out one is farther than the tolerance from the line that stays, at either end
+/// of the slab and in its middle: first those that lie on a line with their neighbours, then the rest by the scheme of
 /// Douglas and Peucker (1973). `tolerance_at` gives the tolerance at a point, m.
 SlabLoop Simplified(const SlabLoop& loop, const std::function<double(const SlabPoint&)>& tolerance_at);
 

@@ -74,24 +74,28 @@ struct Pair {
 Points Regular(int sides, double across_flats) {
   Points points;
   const double radius = across_flats / 2 / std::cos(kPi / sides);
-  for (int k = 0; k < sides; ++k) points.emplace_back(radius * std::cos(2 * kPi * (k + 0.5) / sides), radius * std::sin(2 * kPi * (k + 0.5) / sides));
+  for (int k = 0; k < sides; ++k)
+    points.emplace_back(radius * std::cos(2 * kPi * (k + 0.5) / sides), radius * std::sin(2 * kPi * (k + 0.5) / sides));
   return points;
 }
 
 Pair Keyed() {
   const double c = 0.15;
-  return {Block(20, 10, 0, 50) + Box3(-1.5, 1.5, 4, 6.5, 0, 20),
-          Block(40, 32, -20, 0) - (Block(20 + 2 * c, 10 + 2 * c, -12, 1) + Box3(-1.5 - c, 1.5 + c, 4, 6.5 + c, -12, 1))};
+  return {
+      Block(20, 10, 0, 50) + Box3(-1.5, 1.5, 4, 6.5, 0, 20),
+      Block(40, 32, -20, 0) - (Block(20 + 2 * c, 10 + 2 * c, -12, 1) + Box3(-1.5 - c, 1.5 + c, 4, 6.5 + c, -12, 1))};
 }
 
 Pair DPlug() {
   const double c = 0.12;
-  return {Rod(0, 0, 6, 0, 50) - Box3(4, 10, -10, 10, -1, 60), Block(30, 30, -16, 0) - (Rod(0, 0, 6 + c, -10, 1) - Box3(4 + c, 10, -10, 10, -11, 2))};
+  return {Rod(0, 0, 6, 0, 50) - Box3(4, 10, -10, 10, -1, 60),
+          Block(30, 30, -16, 0) - (Rod(0, 0, 6 + c, -10, 1) - Box3(4 + c, 10, -10, 10, -11, 2))};
 }
 
 Pair UsbA() {
   // Shell of 12 x 4.5 mm, open at the tip; a plastic block fills its upper half.
-  const Shape tool = (Block(12, 4.5, 0, 12) - Block(11.4, 3.9, -1, 12)) + Box3(-5.7, 5.7, 0.1, 1.95, 0.5, 12) + Block(15.7, 8, 12, 52);
+  const Shape tool =
+      (Block(12, 4.5, 0, 12) - Block(11.4, 3.9, -1, 12)) + Box3(-5.7, 5.7, 0.1, 1.95, 0.5, 12) + Block(15.7, 8, 12, 52);
   // The port: a cavity with a tongue in its lower half.
   const Shape target = (Block(22, 14, -18, 0) - Block(12.4, 4.9, -12.5, 1)) + Box3(-5.4, 5.4, -1.65, -0.2, -12.5, -0.5);
   return {tool, target};
@@ -104,7 +108,8 @@ Pair Rj45() {
   latch = Turned(latch, gp_Dir(0, 0, 1), 90);
   const Shape tool = Block(11.6, 8.2, 0, 21) + latch + Box3(-5.8, 5.8, -4.1, 4.1, 20, 55);
   const double c = 0.13;
-  const Shape target = Block(18, 20, -16, 0) - (Box3(-5.8 - c, 5.8 + c, -4.1 - c, 4.1 + c, -14, 1) + Box3(-3.0 - c, 3.0 + c, 4, 7.0 + c, -14, 1));
+  const Shape target = Block(18, 20, -16, 0) - (Box3(-5.8 - c, 5.8 + c, -4.1 - c, 4.1 + c, -14, 1) +
+                                                Box3(-3.0 - c, 3.0 + c, 4, 7.0 + c, -14, 1));
   return {tool, target};
 }
 
@@ -117,7 +122,8 @@ Pair TwoPin() {
 Pair ThreePin() {
   const double c = 0.2;
   const auto pins = [](double grow, double z0, double z1, double earth) {
-    return Box3(-11.1 - 3.2 - grow, -11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) + Box3(11.1 - 3.2 - grow, 11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
+    return Box3(-11.1 - 3.2 - grow, -11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
+           Box3(11.1 - 3.2 - grow, 11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
            Box3(-2 - grow, 2 + grow, 22.2 - 4 - grow, 22.2 + 4 + grow, earth, z1);
   };
   return {pins(0, 0, 19, -4) + Box3(-22, 22, -10, 34, 18, 55), Box3(-32, 32, -20, 44, -30, 0) - pins(c, -18, 1, -22)};
@@ -137,10 +143,13 @@ Pair Gear() {
 }
 
 Pair HexSocket() {
-  return {Rod(0, 0, 8.5, 0, 60) - Prism(Regular(6, 10.2), -1, 8), Prism(Regular(6, 10.0), 0, 6.5) + Rod(0, 0, 3, -25, 0.5) + Block(40, 40, -30, -20)};
+  return {Rod(0, 0, 8.5, 0, 60) - Prism(Regular(6, 10.2), -1, 8),
+          Prism(Regular(6, 10.0), 0, 6.5) + Rod(0, 0, 3, -25, 0.5) + Block(40, 40, -30, -20)};
 }
 
-Pair Taper() { return {Cone(6.0, 7.5, 0, 30) + Rod(0, 0, 7.5, 30, 60), Block(34, 34, -32, 0) - Cone(6.1, 7.6, -30, 0)}; }
+Pair Taper() {
+  return {Cone(6.0, 7.5, 0, 30) + Rod(0, 0, 7.5, 30, 60), Block(34, 34, -32, 0) - Cone(6.1, 7.6, -30, 0)};
+}
 
 Pair Rectangle(double c) { return {Block(8, 7, 0, 50), Block(25, 25, 0, 9) - Block(8 + 2 * c, 7 + 2 * c, -1, 10)}; }
 
@@ -157,15 +166,26 @@ Pair Assembled() {
 
 Pair TwoMouths() {
   const double c = 0.1;
-  return {Block(8, 7, 0, 50), Block(60, 25, -12, 0) - (Box3(-15 - 4 - c, -15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1) + Box3(15 - 4 - c, 15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1))};
+  return {Block(8, 7, 0, 50), Block(60, 25, -12, 0) - (Box3(-15 - 4 - c, -15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1) +
+                                                       Box3(15 - 4 - c, 15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1))};
 }
 
 Pair Draw(const std::string& kind) {
   static const std::vector<std::pair<std::string, std::function<Pair()>>> kKinds = {
-      {"keyed", Keyed},      {"d-plug", DPlug},         {"usb-a", UsbA},         {"rj45", Rj45},
-      {"two-pin", TwoPin},   {"three-pin", ThreePin},   {"gear", Gear},          {"hex-socket", HexSocket},
-      {"taper", Taper},      {"rectangle", [] { return Rectangle(0.1); }},       {"tilted", Tilted},
-      {"assembly", Assembled}, {"two-mouths", TwoMouths}, {"too-large", [] { return Rectangle(-0.13); }}};
+      {"keyed", Keyed},
+      {"d-plug", DPlug},
+      {"usb-a", UsbA},
+      {"rj45", Rj45},
+      {"two-pin", TwoPin},
+      {"three-pin", ThreePin},
+      {"gear", Gear},
+      {"hex-socket", HexSocket},
+      {"taper", Taper},
+      {"rectangle", [] { return Rectangle(0.1); }},
+      {"tilted", Tilted},
+      {"assembly", Assembled},
+      {"two-mouths", TwoMouths},
+      {"too-large", [] { return Rectangle(-0.13); }}};
   for (const auto& [name, draw] : kKinds) {
     if (name == kind) return draw();
   }
@@ -213,7 +233,9 @@ void WriteStl(const Shape& shape, const std::filesystem::path& file, bool ascii)
   out << "solid part\n";
   for (int t = 0; t < mesh.size(); ++t) {
     out << "facet normal 0 0 0\n outer loop\n";
-    for (int k = 0; k < 3; ++k) out << "  vertex " << mesh.Corner(t, k).x() << ' ' << mesh.Corner(t, k).y() << ' ' << mesh.Corner(t, k).z() << '\n';
+    for (int k = 0; k < 3; ++k)
+      out << "  vertex " << mesh.Corner(t, k).x() << ' ' << mesh.Corner(t, k).y() << ' ' << mesh.Corner(t, k).z()
+          << '\n';
     out << " endloop\nendfacet\n";
   }
   out << "endsolid part\n";
@@ -222,10 +244,17 @@ void WriteStl(const Shape& shape, const std::filesystem::path& file, bool ascii)
 }  // namespace
 
 std::vector<PartKind> PartKinds() {
-  return {{"keyed", 0.15, 0.15, 12.0},       {"d-plug", 0.12, 0.12, 10.0},  {"usb-a", 0.2, 0.2, 12.0},
-          {"rj45", 0.13, 0.13, 14.0},        {"two-pin", 0.2, 0.2, 19.0},   {"three-pin", 0.2, 0.2, 18.0},
-          {"gear", 0.1, 0.1, 0.0, true},     {"hex-socket", 0.1, 0.1, 6.5, true}, {"taper", 0.0, 0.0, 0.0},
-          {"tilted", 0.1, 0.1, 9.0},         {"assembly", 0.15, 0.15, 12.0, false, true}};
+  return {{"keyed", 0.15, 0.15, 12.0},
+          {"d-plug", 0.12, 0.12, 10.0},
+          {"usb-a", 0.2, 0.2, 12.0},
+          {"rj45", 0.13, 0.13, 14.0},
+          {"two-pin", 0.2, 0.2, 19.0},
+          {"three-pin", 0.2, 0.2, 22.0},
+          {"gear", 0.1, 0.1, 18.0, true},
+          {"hex-socket", 0.1, 0.1, 8.0, true},
+          {"taper", 0.0, 0.0, 0.0},
+          {"tilted", 0.1, 0.1, 9.0},
+          {"assembly", 0.15, 0.15, 12.0, false, true}};
 }
 
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format) {

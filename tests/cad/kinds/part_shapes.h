@@ -12,16 +12,16 @@ struct PartKind {
   std::string name;
   double clearance_x_mm = 0.0;  ///< a side, as drawn
   double clearance_y_mm = 0.0;
-  double depth_mm = 0.0;        ///< from mouth to fully in; 0: not asserted
+  double depth_mm = 0.0;  ///< from mouth to fully in; 0: not asserted
   bool tool_has_opening = false;
-  bool assembled = false;       ///< both stand as assembled
+  bool assembled = false;  ///< both stand as assembled
 };
 
 /// The kinds that can be drawn.
 std::vector<PartKind> PartKinds();
 
 struct PartFiles {
-  std::string tool;    ///< as `--tool` takes it
+  std::string tool;  ///< as `--tool` takes it
   std::string target;
 };
 /// Draws a kind and writes its parts into a folder. `format`: "step", "stl" (binary) or "stl-ascii"; "assembly" writes

@@ -1,0 +1,204 @@
+// Laws of the way from CAD files to convex pieces.
+// - A slide of one box against another is as long as the gap between them (analytic oracle).
+// - Convex polygons of a section cover it: areas add up, none turns clockwise at a corner.
+// - The pieces of a part deviate from it by no more than the tolerance; a sampled judge never finds more than the exact
+// one.
+// - Parts drawn with a known clearance are found to have it, in STEP and in STL, however their CAD frames lie.
+// - Surfaces that are no solid are mended or refused with the place.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "feeler/cad/align/alignment.h"
+#include "feeler/cad/folder/task_folder.h"
+#include "feeler/cad/measure/deviation.h"
+#include "feeler/cad/measure/mating.h"
+#include "feeler/cad/measure/sliding.h"
+#include "feeler/cad/mesh/mesh_check.h"
+#include "feeler/cad/pieces/decompose.h"
+#include "feeler/cad/readers/read_part.h"
+#include "feeler/cad/section/convex_partition.h"
+#include "feeler/cad/step/read_step.h"
+#include "feeler/core/error.h"
+#include "tests/cad/kinds/part_shapes.h"
+
+namespace feeler::cad {
+namespace {
+
+namespace fs = std::filesystem;
+
+TriangleMesh BoxMesh(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  std::vector<Eigen::Vector3d> corners;
+  for (int c = 0; c < 8; ++c)
+    corners.emplace_back((c & 1) != 0 ? high.x() : low.x(), (c & 2) != 0 ? high.y() : low.y(),
+                         (c & 4) != 0 ? high.z() : low.z());
+  return HullOf(corners)->surface;
+}
+
+CheckedPart Read(const std::string& source) {
+  const RawPart raw = ReadPart(ParseSource(source), [](const fs::path& file) { return ReadStep(file); });
+  return CheckPart(InMetres(raw, GuessUnit(raw).unit), source);
+}
+
+std::string MessageOf(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+class CadParts : public testing::Test {
+ protected:
+  CadParts()
+      : folder_(fs::path(testing::TempDir()) /
+                ("cad_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+    fs::create_directories(folder_);
+  }
+  ~CadParts() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST(MeshSlide, IsAsLongAsTheGap) {
+  const TriangleMesh tool = BoxMesh({-0.004, -0.003, 0}, {0.004, 0.003, 0.02});
+  const TriangleMesh wall = BoxMesh({0.01, -0.05, -0.01}, {0.02, 0.05, 0.01});
+  const MeshTree tree(wall);
+  const MeshSlide slide(tool, tree);
+  EXPECT_NEAR(slide.Travel({0, 0, 0}, {1, 0, 0}, 1), 0.006, 1e-12);
+  EXPECT_NEAR(slide.Travel({0.0021, 0.001, 0}, {1, 0, 0}, 1), 0.0039, 1e-12);
+  EXPECT_EQ(slide.Travel({0, 0, 0}, {-1, 0, 0}, 0.3), 0.3);
+  EXPECT_EQ(slide.Travel({0, 0, 0.02}, {1, 0, 0}, 0.3), 0.3);  // passes over it
+  EXPECT_FALSE(slide.Overlap({0.0059, 0, 0}));
+  EXPECT_TRUE(slide.Overlap({0.0061, 0, 0}));
+}
+
+TEST(ConvexPartition, CoversARingOfManySides) {
+  SlabLoop outside;
+  SlabLoop hole;
+  const auto point = [](double x, double y) { return SlabPoint{{x, y}, {x, y}, {x, y}}; };
+  for (const auto& [x, y] : {std::pair{-0.01, -0.01}, {0.01, -0.01}, {0.01, 0.01}, {-0.01, 0.01}})
+    outside.push_back(point(x, y));
+  const int sides = 97;
+  for (int k = 0; k < sides; ++k)
+    hole.push_back(point(0.006 * std::cos(-2 * std::numbers::pi * k / sides),
+                         0.006 * std::sin(-2 * std::numbers::pi * k / sides)));
+  const std::vector<SlabLoop> polygons = ConvexPartition({outside, hole}, 1e-7);
+  double area = 0;
+  for (const SlabLoop& polygon : polygons) {
+    area += SignedArea(polygon);
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Eigen::Vector2d a = polygon[(i + 1) % polygon.size()].middle - polygon[i].middle;
+      const Eigen::Vector2d b = polygon[(i + 2) % polygon.size()].middle - polygon[(i + 1) % polygon.size()].middle;
+      EXPECT_GT(a.x() * b.y() - a.y() * b.x(), -1e-12);
+    }
+  }
+  EXPECT_NEAR(area, SignedArea(outside) + SignedArea(hole), 1e-12);
+  EXPECT_LE(static_cast<int>(polygons.size()), sides + 1);
+}
+
+TEST_F(CadParts, PiecesAreTheSolid) {
+  for (const char* kind : {"keyed", "d-plug", "usb-a"}) {
+    const PartFiles files = WriteParts(kind, folder_, "step");
+    for (const std::string& file : {files.tool, files.target}) {
+      const CheckedPart part = Read(file);
+      ASSERT_EQ(part.solids.size(), 1U);
+      DecomposeOptions options;
+      options.mating = BoundsOf(part.mesh);
+      const std::vector<ConvexPiece> pieces = Decompose(part.solids.front(), options);
+      double volume = 0;
+      for (const ConvexPiece& piece : pieces) volume += piece.volume;
+      EXPECT_NEAR(volume, VolumeOf(part.mesh), 1e-4 * volume) << file;
+      const MeshTree tree(part.mesh);
+      const Deviation exact = DeviationOf(tree, pieces);
+      const Deviation sampled = SampledDeviation(tree, pieces, 20000, 7);
+      EXPECT_LE(exact.largest_m(), 2e-6) << file;
+      EXPECT_LE(sampled.added_m, exact.added_m + 2e-6) << file;
+      EXPECT_LE(sampled.lost_m, exact.lost_m + 2e-6) << file;
+    }
+  }
+}
+
+TEST_F(CadParts, AMissingPieceAndAFilledHoleAreFound) {
+  const CheckedPart part = Read(WriteParts("rectangle", folder_, "stl").target);
+  DecomposeOptions options;
+  options.mating = BoundsOf(part.mesh);
+  std::vector<ConvexPiece> pieces = Decompose(part.solids.front(), options);
+  const MeshTree tree(part.mesh);
+  std::vector<ConvexPiece> fewer(pieces.begin() + 1, pieces.end());
+  const Deviation lost = DeviationOf(tree, fewer);
+  EXPECT_GT(lost.lost_m, 1e-3);
+  EXPECT_NEAR(lost.lost_m, SampledDeviation(tree, fewer, 100000, 3).lost_m, 2e-4);
+  // The hull of all fills the hole of 8.2 x 7.2 mm: its middle is 3.6 mm from the wall.
+  const std::vector<ConvexPiece> filled{*HullOf(part.mesh.points)};
+  const Deviation added = DeviationOf(tree, filled);
+  EXPECT_NEAR(added.added_m, 0.0036, 5e-6);
+}
+
+TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
+  for (const PartKind& kind : PartKinds()) {
+    if (kind.name == "taper") continue;  // a clearance that changes with the depth
+    for (const char* format : {"step", "stl"}) {
+      const PartFiles files =
+          kind.assembled ? WriteParts(kind.name, folder_, "assembly") : WriteParts(kind.name, folder_, format);
+      const TriangleMesh tool = Read(files.tool).mesh;
+      const TriangleMesh target = Read(files.target).mesh;
+      const std::string where = kind.name + " " + format;
+      ASSERT_NO_THROW({
+        const Alignment alignment = kind.assembled ? AlignAssembled(tool, target) : FindAlignment(tool, target);
+        const Mating mating =
+            MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
+        EXPECT_NEAR(1000 * mating.clearance_m.minCoeff(), std::min(kind.clearance_x_mm, kind.clearance_y_mm), 0.01)
+            << where;
+        EXPECT_NEAR(1000 * mating.depth_m, kind.depth_mm, 0.01) << where;
+        EXPECT_EQ(mating.tool_has_opening, kind.tool_has_opening) << where;
+        EXPECT_FALSE(mating.openings.empty()) << where;
+      }) << where;
+    }
+  }
+}
+
+TEST_F(CadParts, WhatDoesNotFitOrFitsTwiceIsRefused) {
+  const auto find = [&](const std::string& kind) {
+    const PartFiles files = WriteParts(kind, folder_, "stl");
+    return MessageOf([&] { FindAlignment(Read(files.tool).mesh, Read(files.target).mesh); });
+  };
+  EXPECT_THAT(find("too-large"), testing::HasSubstr("0.260 mm too wide"));
+  EXPECT_THAT(find("two-mouths"),
+              testing::HasSubstr("two mouths fit as well: at -15.00,0.00,0.00 and at 15.00,0.00,0.00 mm"));
+}
+
+TEST_F(CadParts, AsciiAndBinaryStlAreOnePart) {
+  const TriangleMesh ascii = Read(WriteParts("keyed", folder_, "stl-ascii").tool).mesh;
+  const TriangleMesh binary = Read(WriteParts("keyed", folder_, "stl").tool).mesh;
+  EXPECT_EQ(ascii.size(), binary.size());
+  EXPECT_NEAR(VolumeOf(ascii), VolumeOf(binary), 1e-6 * VolumeOf(binary));
+}
+
+TEST(CheckPart, MendsWhatIsSafeAndRefusesTheRest) {
+  const TriangleMesh box = BoxMesh({0, 0, 0}, {0.01, 0.02, 0.03});
+  TriangleMesh inside_out = box;
+  for (auto& t : inside_out.triangles) std::swap(t[1], t[2]);
+  EXPECT_NEAR(VolumeOf(CheckPart(inside_out, "part").mesh), 6e-6, 1e-12);
+  TriangleMesh one_turned = box;
+  std::swap(one_turned.triangles[3][0], one_turned.triangles[3][1]);
+  EXPECT_NEAR(VolumeOf(CheckPart(one_turned, "part").mesh), 6e-6, 1e-12);
+  TriangleMesh twice = box;
+  twice.triangles.push_back(twice.triangles.front());
+  EXPECT_THAT(CheckPart(twice, "part").mended, testing::Not(testing::IsEmpty()));
+
+  TriangleMesh open = box;
+  open.triangles.pop_back();
+  EXPECT_THAT(MessageOf([&] { CheckPart(open, "part"); }), testing::HasSubstr("the surface is open"));
+  TriangleMesh sheet;
+  sheet.points = {{0, 0, 0}, {0.01, 0, 0}, {0, 0.01, 0}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 1}};
+  EXPECT_THAT(MessageOf([&] { CheckPart(sheet, "part"); }), testing::HasSubstr("thickness"));
+}
+
+}  // namespace
+}  // namespace feeler::cad
