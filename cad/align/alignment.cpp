@@ -25,6 +25,8 @@ constexpr double kMostSlack = 0.35;
 /// Verified by sliding, the most promising first.
 constexpr std::size_t kMostTrials = 120;
 constexpr double kAbove_m = 1e-3;
+/// Parts that overlap by less than this touch.
+constexpr double kTouch_m = 5e-6;
 
 /// A part turned so that one of its directions is z.
 struct Turned {
@@ -338,12 +340,8 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
 }
 
 Alignment AlignAssembled(const TriangleMesh& tool, const TriangleMesh& target) {
-  const MeshTree as_given(target);
-  if (MeshSlide(tool, as_given).Overlap(Eigen::Vector3d::Zero())) {
-    throw InputError("tool and target", "overlap as they are placed",
-                     "place them as assembled, with clearance all around");
-  }
   std::optional<Alignment> best;
+  bool apart = false;  // along some direction
   std::vector<Eigen::Vector3d> directions = CandidateDirections(target);
   for (const Eigen::Vector3d& d : CandidateDirections(tool)) {
     if (std::none_of(directions.begin(), directions.end(), [&](const auto& known) { return known.dot(d) > 0.99996; }))
@@ -357,12 +355,16 @@ Alignment AlignAssembled(const TriangleMesh& tool, const TriangleMesh& target) {
     const MeshSlide slide(turned_tool, tree);
     const Box tool_box = BoundsOf(turned_tool);
     const double out = BoundsOf(turned_target).sizes().z() + tool_box.sizes().z();
-    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    // A tool that stands on the floor touches it: judged a little above.
+    Eigen::Vector3d offset = kTouch_m * Eigen::Vector3d::UnitZ();
+    if (slide.Overlap(offset)) continue;
+    apart = true;
     if (slide.Travel(offset, Eigen::Vector3d::UnitZ(), out) < out) continue;
     double slack = 0;
     const double most = kMostSlack * std::min(tool_box.sizes().x(), tool_box.sizes().y());
     if (!Center(slide, most, offset, slack)) continue;
     if (best && best->slack_m <= slack * (1 + 1e-6)) continue;
+    offset.z() = 0;
     Alignment alignment;
     alignment.frame_T_tool = FrameOf(turn.linear(), offset);
     alignment.frame_T_target = turn;
@@ -371,6 +373,10 @@ Alignment AlignAssembled(const TriangleMesh& tool, const TriangleMesh& target) {
       alignment.notes.push_back(fmt::format("the tool is moved by {:.3f}, {:.3f} mm to the middle of its play",
                                             1000 * offset.x(), 1000 * offset.y()));
     best = alignment;
+  }
+  if (!apart) {
+    throw InputError("tool and target", "overlap as they are placed",
+                     "place them as assembled, with clearance all around");
   }
   if (!best) {
     throw InputError("tool and target", "the tool does not come out along any axis with play, but little, to all sides",

@@ -1,0 +1,76 @@
+// Laws of an import from front to back: the folder loads as a task whose pieces have the clearance that was drawn; the
+// same input gives the same bytes; what is given on the command line stays when the part is imported again.
+#include "feeler/evaluation/cad_import/import_task.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "feeler/core/error.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/env/model/task_xml.h"
+#include "tests/cad/kinds/part_shapes.h"
+
+namespace feeler::evaluation {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ImportTaskTest : public testing::Test {
+ protected:
+  ImportTaskTest()
+      : folder_(fs::path(testing::TempDir()) /
+                ("import_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {}
+  ~ImportTaskTest() override { fs::remove_all(folder_); }
+
+  ImportOptions OptionsFor(const std::string& kind, const std::string& format) {
+    const cad::PartFiles files = cad::WriteParts(kind, folder_ / "parts", format);
+    ImportOptions options;
+    options.tool = files.tool;
+    options.target = files.target;
+    options.out = folder_ / "task";
+    options.uncertainty_m = {0.005, 0.005, 0.004};
+    options.uncertainty_given = true;
+    return options;
+  }
+  fs::path folder_;
+};
+
+TEST_F(ImportTaskTest, LoadsWithTheClearanceThatWasDrawn) {
+  const ImportedTask task = ImportTask(OptionsFor("keyed", "step"));
+  EXPECT_NEAR(task.pieces_clearance_m.x(), 0.00015, 1e-6);
+  EXPECT_NEAR(task.pieces_clearance_m.y(), 0.00015, 1e-6);
+  EXPECT_LE(task.target.pieces.size(), 64U);
+  const env::TaskModel model = env::LoadTask(task.task_file.string());
+  EXPECT_NEAR(model.task.insertion_depth_m, 0.012, 1e-5);
+  EXPECT_EQ(model.lid_geoms.size(), 1U);
+  EXPECT_GE(task.content.numbers.margin_cells, 0.3);
+}
+
+TEST_F(ImportTaskTest, SameInputGivesSameBytes) {
+  const ImportOptions options = OptionsFor("d-plug", "stl");
+  ImportTask(options);
+  const std::string xml = env::ReadTextFile(options.out / "task.xml");
+  const std::string json = env::ReadTextFile(options.out / "import.json");
+  const std::string piece = env::ReadTextFile(options.out / "target_007.stl");
+  fs::remove_all(options.out);
+  ImportTask(options);
+  EXPECT_EQ(env::ReadTextFile(options.out / "task.xml"), xml);
+  EXPECT_EQ(env::ReadTextFile(options.out / "import.json"), json);
+  EXPECT_EQ(env::ReadTextFile(options.out / "target_007.stl"), piece);
+}
+
+TEST_F(ImportTaskTest, OverridesAreKept) {
+  ImportOptions options = OptionsFor("rectangle", "step");
+  options.overrides["feeler_max_cells"] = "7 7 5";
+  ImportTask(options);
+  options.overrides.clear();
+  const ImportedTask again = ImportTask(options);
+  EXPECT_EQ(env::LoadTask(again.task_file.string()).task.axes[2].max_cells, 5);
+  options.overrides["feeler_speling"] = "1";
+  EXPECT_THROW(ImportTask(options), InputError);
+}
+
+}  // namespace
+}  // namespace feeler::evaluation
