@@ -11,6 +11,7 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/planner/policy/evaluate.h"
+#include "feeler/workflow/setup/bundle.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -165,6 +166,19 @@ void Export(const Flags& flags) {
   WritePolicy(problem, *stored.policy, setup.task().name, flags.out);
 }
 
+void Bundle(const Flags& flags) {
+  const policies::Database database = policies::Database::OpenReadOnly(flags.file);
+  const workflow::PlanningSetup setup = SetupFor(database, flags);
+  database.RequireFingerprint(setup.task().name, setup.fingerprint);
+  workflow::KeepBundle(setup, flags.file);
+  const std::string path = policies::BundlePathOf(flags.file);
+  if (flags.json) {
+    PrintJson({{"bundle", path}, {"task", setup.task().name}});
+  } else {
+    fmt::print("{}: what an executor of {} needs without a simulator\n", path, setup.task().name);
+  }
+}
+
 }  // namespace
 
 void AddDbCommand(CLI::App& app, Session& session) {
@@ -199,6 +213,11 @@ void AddDbCommand(CLI::App& app, Session& session) {
     auto [command, flags] = add("verify", "Replay every policy under every hypothesis against the contact map");
     add_task(command, flags);
     command->callback([flags = flags, &session] { Verify(*flags, session); });
+  }
+  {
+    auto [command, flags] = add("bundle", "Write what an executor without a simulator needs of the task: FILE.bundle");
+    add_task(command, flags);
+    command->callback([flags = flags] { Bundle(*flags); });
   }
   {
     auto [command, flags] = add("export", "One policy as JSON (docs/file-formats.md)");

@@ -7,6 +7,7 @@
 
 #include "feeler/cli/commands.h"
 #include "feeler/core/error.h"
+#include "feeler/version.h"
 
 namespace {
 

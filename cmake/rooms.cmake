@@ -1,15 +1,18 @@
 # Helpers that turn folders into targets.
+include(GNUInstallDirs)
 
-add_library(feeler_options INTERFACE)
-# Headers are spelled "feeler/ROOM/..." in the tree as where they are installed: the build tree holds a folder `feeler` with
-# a link to each room.
-file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/feeler)
+# What every room and every user of one gets: where headers lie, spelled "feeler/ROOM/..." in the tree as where they are
+# installed (the build tree holds a folder `feeler` with a link to each room), and the language.
+set(FEELER_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
+file(MAKE_DIRECTORY ${FEELER_INCLUDE_DIR}/feeler)
 foreach(room core planner policies execution env cad perception workflow evaluation cli)
-  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${room} ${PROJECT_BINARY_DIR}/include/feeler/${room} SYMBOLIC)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${room} ${FEELER_INCLUDE_DIR}/feeler/${room} SYMBOLIC)
 endforeach()
-target_include_directories(feeler_options INTERFACE ${PROJECT_BINARY_DIR}/include)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/version.h.in ${FEELER_INCLUDE_DIR}/feeler/version.h @ONLY)
+
+# How our own code is compiled; nothing of it reaches who links a room.
+add_library(feeler_options INTERFACE)
 target_compile_options(feeler_options INTERFACE -Wall -Wextra -Wshadow -Wpedantic -ffp-contract=off)
-target_compile_definitions(feeler_options INTERFACE FEELER_VERSION="${PROJECT_VERSION}")
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC 12 reports false overlaps in `"text" + std::string` (GCC bug 105651) and false sizes in comparisons of byte
   # vectors (GCC bug 107852).
@@ -25,28 +28,63 @@ if(FEELER_SANITIZE)
   target_link_options(feeler_options INTERFACE -fsanitize=${FEELER_SANITIZE})
 endif()
 
-# feeler_room(NAME DEPENDENCY...): target feeler::NAME from the sources in the folder NAME (main.cpp excepted).
-function(feeler_room name)
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${name}/*.cpp)
-  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
-  if(sources)
-    add_library(feeler_${name} STATIC ${sources})
-    target_link_libraries(feeler_${name} PUBLIC feeler_options ${ARGN})
-  else()
-    add_library(feeler_${name} INTERFACE)
-    target_link_libraries(feeler_${name} INTERFACE feeler_options ${ARGN})
+# feeler_unity(TARGET SOURCE...): one translation unit a folder. Most of the time goes into the same templates (Eigen,
+# JSON, the standard library), file after file.
+function(feeler_unity target)
+  if(NOT FEELER_UNITY)
+    return()
   endif()
-  add_library(feeler::${name} ALIAS feeler_${name})
+  foreach(source ${ARGN})
+    file(RELATIVE_PATH path ${PROJECT_SOURCE_DIR} ${source})
+    get_filename_component(folder ${path} DIRECTORY)
+    string(REPLACE "/" "_" group ${folder})
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# feeler_tests(ROOM): executable ROOM_tests from tests/ROOM/*.cpp, each test registered with ctest.
+set(FEELER_COMPONENTS "" CACHE INTERNAL "Installed rooms")
+
+# feeler_target(NAME SOURCES ... ROOMS ... LIBRARIES ... LINKS ...): library feeler_NAME, feeler::NAME to its users.
+# ROOMS: what it uses of ours; LIBRARIES: names of feeler_find_dependency; LINKS: their targets.
+function(feeler_target name)
+  cmake_parse_arguments(arg "NO_INSTALL;NO_UNITY" "" "SOURCES;ROOMS;LIBRARIES;LINKS" ${ARGN})
+  add_library(feeler_${name} ${arg_SOURCES})
+  add_library(feeler::${name} ALIAS feeler_${name})
+  set(links ${arg_ROOMS})
+  list(TRANSFORM links PREPEND feeler::)
+  list(APPEND links ${arg_LINKS})
+  target_compile_features(feeler_${name} PUBLIC cxx_std_20)
+  target_include_directories(feeler_${name} PUBLIC $<BUILD_INTERFACE:${FEELER_INCLUDE_DIR}>
+                             $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(feeler_${name} PUBLIC ${links} PRIVATE $<BUILD_INTERFACE:feeler_options>)
+  set_target_properties(feeler_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
+                        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  if(NOT arg_NO_UNITY)
+    feeler_unity(feeler_${name} ${arg_SOURCES})
+  endif()
+  if(NOT arg_NO_INSTALL)
+    feeler_install_component(${name} "${arg_ROOMS}" "${arg_LIBRARIES}")
+  endif()
+endfunction()
+
+# feeler_sources(VARIABLE FOLDER): the sources in a folder and below, main.cpp excepted.
+function(feeler_sources variable folder)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
+  set(${variable} ${sources} PARENT_SCOPE)
+endfunction()
+
+# feeler_tests(ROOM): executable ROOM_tests from tests/ROOM/*.cpp, each test registered with ctest. Built by the target
+# `tests`.
 function(feeler_tests room)  # the tests of `cli` run the binary
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/${room}/*.cpp)
   if(NOT sources)
     return()
   endif()
-  add_executable(${room}_tests ${sources})
-  target_link_libraries(${room}_tests PRIVATE feeler::${room} GTest::gtest GTest::gmock GTest::gtest_main)
+  add_executable(${room}_tests EXCLUDE_FROM_ALL ${sources})
+  add_dependencies(tests ${room}_tests)
+  target_link_libraries(${room}_tests PRIVATE feeler_options ${ARGN} GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")
   # A test is compiled more often than its own code runs long; what it tests is in the rooms, optimised in full.
@@ -56,51 +94,3 @@ function(feeler_tests room)  # the tests of `cli` run the binary
   endif()
   gtest_discover_tests(${room}_tests DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 600 LABELS ${room})
 endfunction()
-
-# Libraries whose packages ship no usable CMake target. Their headers are system headers: our warnings are for our code.
-find_library(MUJOCO_LIBRARY mujoco REQUIRED)
-find_path(MUJOCO_INCLUDE_DIR mujoco/mujoco.h REQUIRED)
-add_library(feeler_mujoco INTERFACE)
-target_include_directories(feeler_mujoco SYSTEM INTERFACE ${MUJOCO_INCLUDE_DIR})
-target_link_libraries(feeler_mujoco INTERFACE ${MUJOCO_LIBRARY})
-add_library(feeler::mujoco ALIAS feeler_mujoco)
-
-find_package(PkgConfig REQUIRED)
-pkg_check_modules(URDFDOM REQUIRED IMPORTED_TARGET urdfdom)
-add_library(feeler_urdfdom INTERFACE)
-target_link_libraries(feeler_urdfdom INTERFACE PkgConfig::URDFDOM)
-add_library(feeler::urdfdom ALIAS feeler_urdfdom)
-
-pkg_check_modules(EGL REQUIRED IMPORTED_TARGET egl)
-pkg_check_modules(TINYXML2 REQUIRED IMPORTED_TARGET tinyxml2)
-add_library(feeler_egl INTERFACE)
-target_link_libraries(feeler_egl INTERFACE PkgConfig::EGL)
-add_library(feeler::egl ALIAS feeler_egl)
-add_library(tinyxml2 ALIAS PkgConfig::TINYXML2)
-
-find_package(ompl REQUIRED)
-add_library(feeler_ompl INTERFACE)
-target_include_directories(feeler_ompl SYSTEM INTERFACE ${OMPL_INCLUDE_DIRS})
-# Debian's omplConfig also lists Boost libraries and ODE, which its package does not bring and we do not use.
-list(GET OMPL_LIBRARIES 0 FEELER_OMPL_LIBRARY)
-target_link_libraries(feeler_ompl INTERFACE ${FEELER_OMPL_LIBRARY})
-add_library(feeler::ompl ALIAS feeler_ompl)
-
-# Debian's CMake package of OpenCV wants every module; these are the ones used.
-add_library(feeler_opencv INTERFACE)
-find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
-target_include_directories(feeler_opencv SYSTEM INTERFACE ${OPENCV_INCLUDE_DIR})
-foreach(module core imgproc features2d)
-  find_library(OPENCV_${module}_LIBRARY opencv_${module} REQUIRED)
-  target_link_libraries(feeler_opencv INTERFACE ${OPENCV_${module}_LIBRARY})
-endforeach()
-add_library(feeler::opencv ALIAS feeler_opencv)
-find_library(OPENCV_imgcodecs_LIBRARY opencv_imgcodecs REQUIRED)
-add_library(feeler_imgcodecs INTERFACE)
-target_link_libraries(feeler_imgcodecs INTERFACE feeler_opencv ${OPENCV_imgcodecs_LIBRARY})
-add_library(feeler::imgcodecs ALIAS feeler_imgcodecs)
-
-find_path(NANOFLANN_INCLUDE_DIR nanoflann.hpp REQUIRED)
-add_library(feeler_nanoflann INTERFACE)
-target_include_directories(feeler_nanoflann SYSTEM INTERFACE ${NANOFLANN_INCLUDE_DIR})
-add_library(feeler::nanoflann ALIAS feeler_nanoflann)

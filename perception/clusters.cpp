@@ -14,30 +14,30 @@
 namespace feeler::perception {
 namespace {
 
-using Key = std::array<std::int64_t, 3>;
+using CubeKey = std::array<std::int64_t, 3>;
 
 /// A number for each point, the same for points whose cubes of edge `link_m` touch, directly or by others.
 std::vector<int> Groups(const Points& points, double link_m, int& groups) {
-  std::map<Key, std::vector<std::size_t>> cubes;
+  std::map<CubeKey, std::vector<std::size_t>> cubes;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    Key key;
+    CubeKey key;
     for (int axis = 0; axis < 3; ++axis) {
       key[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(points[i][axis] / link_m));
     }
     cubes[key].push_back(i);
   }
-  std::map<Key, int> group_of;
+  std::map<CubeKey, int> group_of;
   groups = 0;
   for (const auto& [seed, members] : cubes) {
     if (group_of.contains(seed)) continue;
     const int group = groups++;
-    std::vector<Key> open = {seed};
+    std::vector<CubeKey> open = {seed};
     group_of[seed] = group;
     while (!open.empty()) {
-      const Key at = open.back();
+      const CubeKey at = open.back();
       open.pop_back();
       for (int n = 0; n < 27; ++n) {
-        const Key next = {at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1};
+        const CubeKey next = {at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1};
         if (cubes.contains(next) && group_of.emplace(next, group).second) open.push_back(next);
       }
     }

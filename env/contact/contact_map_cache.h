@@ -15,10 +15,4 @@ std::filesystem::path CacheFolder();
 planner::ContactMap GetContactMap(const TaskModel& task_model, Opening opening, Parallelism parallelism = {},
                                   const ProgressCallback& progress = {});
 
-/// Writes atomically (a temporary file, then a rename): readers see the old file, the new one or none.
-/// Returns false when the folder cannot be written.
-bool StoreContactMap(const std::filesystem::path& file, const planner::ContactMap& map);
-/// Throws InputError when the file is missing, of another version or damaged.
-planner::ContactMap ReadContactMap(const std::filesystem::path& file);
-
 }  // namespace feeler::env

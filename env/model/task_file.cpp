@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <numbers>
 #include <string_view>
 
+#include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 #include "feeler/core/orientation_lattice.h"
 #include "feeler/env/model/mujoco_handles.h"
@@ -157,10 +157,7 @@ std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
   return orientations;
 }
 
-fs::path ModelsFolder() {
-  const char* folder = std::getenv("FEELER_MODELS");
-  return folder != nullptr && *folder != '\0' ? fs::path(folder) : fs::path(FEELER_MODELS_DIR);
-}
+fs::path ModelsFolder() { return FindData("models"); }
 
 TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, const fs::path& folder) {
   TaskModel task_model;

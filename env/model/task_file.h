@@ -44,7 +44,7 @@ FeltGeoms GeomsOf(const TaskModel& task_model, Opening opening);
 /// there are none), at their largest extents: Rz(yaw) * Ry(pitch), each angle (k - (n - 1)/2) * resolution.
 std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task);
 
-/// Where models/ lies: $FEELER_MODELS if set, else the folder of the source tree the program was built from.
+/// Where models/ lies (core/data_folder.h). Throws InputError that lists what it looked for if it is nowhere.
 std::filesystem::path ModelsFolder();
 
 /// Loads `task`: a name under models/tasks/ ("plug") or a path to a task file. Fields: docs/task-file.md.

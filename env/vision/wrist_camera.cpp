@@ -9,7 +9,7 @@
 namespace feeler::env {
 namespace {
 
-RendererOptions RenderingOf(const WristCameraOptions& options) {
+RendererOptions WristRenderingOf(const WristCameraOptions& options) {
   RendererOptions rendering;
   rendering.width = options.width;
   rendering.height = options.height;
@@ -49,7 +49,7 @@ WristCamera::WristCamera(std::shared_ptr<const Scene> scene, const WristCameraOp
     : scene_(std::move(scene)),
       options_(options),
       camera_(mj_name2id(scene_->drawn_model.get(), mjOBJ_CAMERA, kWristCamera)),
-      renderer_(scene_->drawn_model, RenderingOf(options)),
+      renderer_(scene_->drawn_model, WristRenderingOf(options)),
       drawn_(MakeData(*scene_->drawn_model)) {
   if (camera_ < 0) throw InputError("wrist camera", "the scene has none", "name a camera on the robot `wrist`");
 }

@@ -10,6 +10,7 @@
 #include "feeler/env/contact/contact_map_builder.h"
 #include "feeler/env/contact/contact_map_check.h"
 #include "feeler/evaluation/harness/cell_store.h"
+#include "feeler/version.h"
 
 namespace feeler::evaluation {
 namespace {
@@ -19,7 +20,7 @@ using nlohmann::json;
 constexpr std::array<const char*, 2> kTasks = {"pipe-into-elbow", "elbow-onto-pipe"};
 constexpr double kGrazing_m = 5e-5;
 
-json Measure(const std::string& name, std::int64_t probes, const ExperimentRequest& request) {
+json MeasureMap(const std::string& name, std::int64_t probes, const ExperimentRequest& request) {
   const env::TaskModel task_model = env::LoadTask(name);
   const std::clock_t cpu_start = std::clock();
   const auto start = std::chrono::steady_clock::now();
@@ -58,7 +59,7 @@ ExperimentResult RunAcceptanceContactMaps(const ExperimentRequest& request) {
   std::int64_t done = 0;
   for (const char* task : kTasks) {
     if (request.cancellation != nullptr && request.cancellation->cancelled()) return result;
-    if (cells.Find(task) == nullptr) cells.Put(task, Measure(task, probes, request));
+    if (cells.Find(task) == nullptr) cells.Put(task, MeasureMap(task, probes, request));
     if (request.progress) request.progress(++done, kTasks.size());
   }
 

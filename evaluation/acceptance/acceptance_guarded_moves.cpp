@@ -20,6 +20,7 @@
 #include "feeler/env/robot/tool_kinematics.h"
 #include "feeler/evaluation/harness/cell_store.h"
 #include "feeler/evaluation/records/statistics.h"
+#include "feeler/version.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/setup/planning_setup.h"
 

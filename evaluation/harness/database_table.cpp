@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "feeler/evaluation/records/statistics.h"
+#include "feeler/version.h"
 #include "feeler/workflow/setup/planning_setup.h"
 
 namespace feeler::evaluation {

@@ -12,6 +12,7 @@
 #include "feeler/evaluation/records/episode_json.h"
 #include "feeler/evaluation/records/scene_geometry.h"
 #include "feeler/planner/family/problem_family.h"
+#include "feeler/version.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_draw.h"
 #include "feeler/workflow/setup/database_builder.h"

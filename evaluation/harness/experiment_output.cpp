@@ -10,6 +10,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/version.h"
 
 namespace feeler::evaluation {
 namespace {

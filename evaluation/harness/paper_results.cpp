@@ -2,6 +2,7 @@
 
 #include <fstream>
 
+#include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 
 namespace feeler::evaluation {
@@ -17,10 +18,11 @@ PrintedRow Values(const nlohmann::json& row) {
 
 const nlohmann::json& PaperResults() {
   static const nlohmann::json kResults = [] {
-    std::ifstream in(FEELER_PAPER_RESULTS);
+    const std::string file = FindData("evaluation/paper_results.json").string();
+    std::ifstream in(file);
     nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
     if (!json.is_object()) {
-      throw InputError(FEELER_PAPER_RESULTS, "missing or damaged", "restore it from the source of feeler");
+      throw InputError(file, "damaged", "restore it from the source of feeler");
     }
     return json;
   }();

@@ -19,6 +19,7 @@
 #include "feeler/planner/solve.h"
 #include "feeler/policies/database_policy.h"
 #include "feeler/policies/touch/kinematic_walk.h"
+#include "feeler/version.h"
 #include "feeler/workflow/setup/planning_setup.h"
 #include "feeler/workflow/setup/policy_registry.h"
 

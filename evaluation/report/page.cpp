@@ -7,11 +7,13 @@
 #include <set>
 #include <string_view>
 
+#include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/evaluation/harness/paper_results.h"
 #include "feeler/evaluation/records/scene_geometry.h"
+#include "feeler/version.h"
 
 namespace feeler::evaluation {
 namespace {
@@ -30,8 +32,7 @@ std::string ReadText(const std::string& path, const std::string& mend) {
 }
 
 std::string PageFile(const std::string& name) {
-  return ReadText(std::string(FEELER_REPORT_PAGE) + "/" + name,
-                  "the source tree of feeler must stay where it was built");
+  return ReadText(FindData("evaluation/report/page").string() + "/" + name, "install feeler again");
 }
 
 std::string Library(const std::string& path) {

@@ -11,6 +11,7 @@
 #include "feeler/evaluation/harness/experiment_output.h"
 #include "feeler/evaluation/report/embedded_picture.h"
 #include "feeler/evaluation/report/record_line.h"
+#include "feeler/version.h"
 
 namespace feeler::evaluation {
 namespace {

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <mutex>
 
+#include "feeler/version.h"
+
 namespace feeler::evaluation {
 namespace {
 

@@ -31,29 +31,29 @@ const std::vector<Kind>& Kinds() {
   return kKinds;
 }
 
-struct Competitor {
+struct NoiseCompetitor {
   const char* name;
   const char* policy;
   bool ladder;
 };
-constexpr Competitor kCompetitors[] = {{"database", "database", true},
-                                       {"database, bare", "database", false},
-                                       {"tbl", "tbl", true},
-                                       {"spiral", "spiral", false}};
+constexpr NoiseCompetitor kNoiseCompetitors[] = {{"database", "database", true},
+                                                 {"database, bare", "database", false},
+                                                 {"tbl", "tbl", true},
+                                                 {"spiral", "spiral", false}};
 
-struct Row {
+struct NoiseRow {
   const Kind* kind;
   double level;
-  const Competitor* competitor;
+  const NoiseCompetitor* competitor;
   EpisodeSetting setting;
 };
 
-std::vector<Row> RowsOf(bool quick) {
-  std::vector<Row> rows;
+std::vector<NoiseRow> NoiseRowsOf(bool quick) {
+  std::vector<NoiseRow> rows;
   for (const Kind& kind : Kinds()) {
     for (std::size_t i = 0; i < kind.levels.size(); ++i) {
       if (quick && i % 3 != 1) continue;
-      for (const Competitor& competitor : kCompetitors) {
+      for (const NoiseCompetitor& competitor : kNoiseCompetitors) {
         EpisodeSetting setting;
         setting.policy = competitor.policy;
         setting.cost = "time";
@@ -76,9 +76,9 @@ std::vector<Row> RowsOf(bool quick) {
 }  // namespace
 
 ExperimentResult RunNoise(const ExperimentRequest& request) {
-  const std::vector<Row> rows = RowsOf(request.quick);
+  const std::vector<NoiseRow> rows = NoiseRowsOf(request.quick);
   std::vector<EpisodeSetting> settings;
-  for (const Row& row : rows) settings.push_back(row.setting);
+  for (const NoiseRow& row : rows) settings.push_back(row.setting);
   EpisodeSweep sweep(kNoiseName, std::move(settings), request);
   ExperimentResult result;
   result.seeds = {request.seed};
@@ -92,7 +92,7 @@ ExperimentResult RunNoise(const ExperimentRequest& request) {
                             request.seed, "noise", "level", "policy", EpisodeHeader());
   std::map<const Kind*, std::vector<EpisodePoint>> points;
   std::map<std::pair<const Kind*, std::string>, double> breaks;  // the first level with fewer than 95 % inserted
-  for (const Row& row : rows) {
+  for (const NoiseRow& row : rows) {
     const EpisodeStatistics s = StatisticsOf(sweep.Records(row.setting));
     std::vector<json> values = {row.kind->noise, row.level, row.kind->unit, row.competitor->name};
     for (json& value : EpisodeValues(s)) values.push_back(std::move(value));
@@ -107,7 +107,7 @@ ExperimentResult RunNoise(const ExperimentRequest& request) {
   result.text += "\nFirst level with fewer than 95 % inserted:\n";
   for (const Kind& kind : Kinds()) {
     result.text += fmt::format("  {:<26}", kind.title);
-    for (const Competitor& competitor : kCompetitors) {
+    for (const NoiseCompetitor& competitor : kNoiseCompetitors) {
       const auto found = breaks.find({&kind, competitor.name});
       const std::string level = found == breaks.end() ? "none" : fmt::format("{:g} {}", found->second, kind.unit);
       result.text += fmt::format(" {}: {};", competitor.name, level);

@@ -29,13 +29,13 @@ std::vector<perception::PoseSample> Poses(const workflow::Calibration& part) {
   return poses;
 }
 
-struct Row {
+struct PerceptionRow {
   std::string range;
   workflow::ErrorSummary errors;
   perception::TableScore corrected, plain;
 };
 
-void Add(const Row& row, ExperimentResult& result) {
+void Add(const PerceptionRow& row, ExperimentResult& result) {
   constexpr double kDegree = 57.29577951308232;
   const auto share = [](const perception::TableScore& score) {
     return score.samples > 0 ? static_cast<double>(score.covered) / score.samples : 0.0;

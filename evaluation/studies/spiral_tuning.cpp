@@ -15,13 +15,13 @@ namespace {
 
 using nlohmann::json;
 
-struct Row {
+struct SpiralRow {
   policies::SpiralTuning tuning;
   EpisodeSetting setting;
   EpisodeStatistics statistics;
 };
 
-std::vector<Row> RowsOf(bool quick) {
+std::vector<SpiralRow> SpiralRowsOf(bool quick) {
   struct Socket {
     const char* task;
     std::vector<double> pitch_mm;
@@ -39,12 +39,12 @@ std::vector<Row> RowsOf(bool quick) {
     }
     forces_n = {20};
   }
-  std::vector<Row> rows;
+  std::vector<SpiralRow> rows;
   for (const Socket& socket : sockets) {
     for (const double pitch_mm : socket.pitch_mm) {
       for (const double speed_mm_s : socket.speeds_mm_s) {
         for (const double force_n : forces_n) {
-          Row row;
+          SpiralRow row;
           row.tuning = {1e-3 * pitch_mm, 1e-3 * speed_mm_s, force_n};
           row.setting.task = socket.task;
           row.setting.policy = "spiral";
@@ -63,13 +63,13 @@ std::vector<Row> RowsOf(bool quick) {
 }
 
 /// Most insertions; of equals the least median time.
-const Row* BestOf(const std::vector<Row>& rows, const std::string& task) {
+const SpiralRow* BestOf(const std::vector<SpiralRow>& rows, const std::string& task) {
   int most = 0;
-  for (const Row& row : rows) {
+  for (const SpiralRow& row : rows) {
     if (row.setting.task == task) most = std::max(most, row.statistics.inserted.successes);
   }
-  const Row* best = nullptr;
-  for (const Row& row : rows) {
+  const SpiralRow* best = nullptr;
+  for (const SpiralRow& row : rows) {
     if (row.setting.task != task || row.statistics.inserted.successes < std::max(1, most)) continue;
     if (best == nullptr || row.statistics.sim_time.value < best->statistics.sim_time.value) best = &row;
   }
@@ -79,9 +79,9 @@ const Row* BestOf(const std::vector<Row>& rows, const std::string& task) {
 }  // namespace
 
 ExperimentResult RunSpiralTuning(const ExperimentRequest& request) {
-  std::vector<Row> rows = RowsOf(request.quick);
+  std::vector<SpiralRow> rows = SpiralRowsOf(request.quick);
   std::vector<EpisodeSetting> settings;
-  for (const Row& row : rows) settings.push_back(row.setting);
+  for (const SpiralRow& row : rows) settings.push_back(row.setting);
   EpisodeSweep sweep(kSpiralTuningName, std::move(settings), request);
   ExperimentResult result;
   result.seeds = {request.seed};
@@ -96,7 +96,7 @@ ExperimentResult RunSpiralTuning(const ExperimentRequest& request) {
       "{:>5} {}\n",
       request.seed, "task", "pitch", "mm/s", "N", EpisodeHeader());
   std::vector<EpisodePoint> points;
-  for (Row& row : rows) {
+  for (SpiralRow& row : rows) {
     row.statistics = StatisticsOf(sweep.Records(row.setting));
     const policies::SpiralTuning& t = row.tuning;
     std::vector<json> values = {row.setting.task, 1e3 * t.pitch_m, 1e3 * t.speed_m_s, t.press_n};
@@ -109,7 +109,7 @@ ExperimentResult RunSpiralTuning(const ExperimentRequest& request) {
   }
   result.text += "\nBest (most inserted, then least time):\n";
   for (const char* task : {"plug", "plug-tight"}) {
-    const Row* best = BestOf(rows, task);
+    const SpiralRow* best = BestOf(rows, task);
     if (best == nullptr) continue;
     const policies::SpiralTuning& t = best->tuning;
     result.text += fmt::format("  {:<11} pitch {:.2f} mm, {:.0f} mm/s, {:.0f} N\n", task, 1e3 * t.pitch_m,

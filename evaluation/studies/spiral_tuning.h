@@ -7,7 +7,7 @@ namespace feeler::evaluation {
 inline constexpr const char* kSpiralTuningName = "spiral-tuning";
 
 /// Pitch, speed and force of the spiral search, per socket: success and seconds of every combination over the same
-/// episodes. The best of a socket is what `spiral` uses there (workflow::TunedSpiral).
+/// episodes. workflow::DerivedSpiral was taken from it.
 ExperimentResult RunSpiralTuning(const ExperimentRequest& request);
 
 }  // namespace feeler::evaluation

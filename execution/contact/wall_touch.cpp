@@ -13,27 +13,27 @@ namespace feeler::execution {
 namespace {
 
 /// A touch begins this far from the wall, in cells.
-constexpr double kNearest = 1.5;
-constexpr double kFarthest = 2.5;
+constexpr double kNearestWall = 1.5;
+constexpr double kFarthestWall = 2.5;
 /// Lines that meet the same wall differ by less than this.
-constexpr double kSameWall = 0.2;
+constexpr double kSameTravel = 0.2;
 
 /// The displacement on the line through `line` along `direction` from which the nearest wall, coming from outside, is
-/// between kNearest and kFarthest away.
+/// between kNearestWall and kFarthestWall away.
 std::optional<Cell> InFront(const planner::ContactMap& map, Cell line, Direction direction, int orientation) {
   const int axis = AxisOf(direction);
   line[axis] = SignOf(direction) > 0 ? map.domain().min[axis] : map.domain().max[axis];
   if (map.Blocked(line, orientation)) return std::nullopt;
   const double travel = map.Travel(line, direction, orientation);
   if (travel > 1e6) return std::nullopt;
-  const int steps = std::max(0, static_cast<int>(std::floor(travel - kNearest)));
+  const int steps = std::max(0, static_cast<int>(std::floor(travel - kNearestWall)));
   const Cell cell = line + steps * UnitCell(direction);
-  return map.Travel(cell, direction, orientation) <= kFarthest ? std::optional(cell) : std::nullopt;
+  return map.Travel(cell, direction, orientation) <= kFarthestWall ? std::optional(cell) : std::nullopt;
 }
 
 bool SameWall(const planner::ContactMap& map, const Cell& a, const Cell& b, Direction direction, int orientation) {
   return !map.Blocked(b, orientation) &&
-         std::abs(map.Travel(a, direction, orientation) - map.Travel(b, direction, orientation)) <= kSameWall;
+         std::abs(map.Travel(a, direction, orientation) - map.Travel(b, direction, orientation)) <= kSameTravel;
 }
 
 }  // namespace

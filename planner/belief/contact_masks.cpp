@@ -5,7 +5,7 @@
 namespace feeler::planner {
 namespace {
 
-constexpr int kWindow = 16;
+constexpr int kMaskWindow = 16;
 
 struct HashBits {
   std::size_t operator()(const Bits256& b) const {
@@ -35,7 +35,7 @@ bool StepMatters(const ContactMap& map, const Cell& displacement, Direction d, i
 ContactMasks::ContactMasks(const ContactMap& map) {
   // One cell beyond the map's domain everything repeats, save steps back into it; a window reaches 15 cells down from
   // its corner.
-  domain_ = {map.domain().min - Cell::Ones(), map.domain().max + Cell(kWindow, kWindow, 1)};
+  domain_ = {map.domain().min - Cell::Ones(), map.domain().max + Cell(kMaskWindow, kMaskWindow, 1)};
   size_ = domain_.Size();
   stride_ = static_cast<std::size_t>(domain_.Count());
   index_.assign(stride_ * kDirectionCount * static_cast<std::size_t>(map.orientations()), 0);
@@ -47,7 +47,7 @@ ContactMasks::ContactMasks(const ContactMap& map) {
       std::uint32_t* const plane = &index_[static_cast<std::size_t>(o * kDirectionCount + IndexOf(d)) * stride_];
       for (int z = 0; z < size_.z(); ++z) {
         std::vector<Bits256> column(static_cast<std::size_t>(size_.x()));
-        for (int y = 1 - kWindow; y < size_.y(); ++y) {
+        for (int y = 1 - kMaskWindow; y < size_.y(); ++y) {
           const auto blocked = [&](int x) {
             return StepMatters(map, sampled.Clamp(domain_.min + Cell(x, y, z)), d, o);
           };
@@ -58,7 +58,7 @@ ContactMasks::ContactMasks(const ContactMap& map) {
             if (domain_.min.x() + x <= sampled.max.x()) last = blocked(x);
             row = (row << 1 | (last ? 1U : 0U)) & 0xFFFF;
             Bits256& mask = column[static_cast<std::size_t>(x)];
-            mask = mask.Up(kWindow);
+            mask = mask.Up(kMaskWindow);
             mask.word[0] |= row;
             if (y < 0 || !mask.Any()) continue;
             const auto [at, added] = known.try_emplace(mask, static_cast<std::uint32_t>(masks_.size()));

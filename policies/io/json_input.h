@@ -63,4 +63,7 @@ class JsonField {
   std::size_t index_ = 0;
 };
 
+/// [x, y, z].
+inline nlohmann::json CellJson(const Cell& c) { return nlohmann::json::array({c.x(), c.y(), c.z()}); }
+
 }  // namespace feeler::policies

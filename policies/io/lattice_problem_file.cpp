@@ -125,8 +125,6 @@ void CheckDisplacements(const LatticeProblemData& data, const JsonField& documen
                         "use a smaller workspace or larger cells");
 }
 
-json CellJson(const Cell& c) { return json::array({c.x(), c.y(), c.z()}); }
-
 template <typename Items, typename ToJson>
 std::string FormatList(const Items& items, const ToJson& to_json) {
   std::string text = "[";

@@ -16,10 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxHypotheses = std::size_t{1} << 20;
-constexpr int kMaxCoordinate = kMaxPolicyOffset;
-
-json CellJson(const Cell& c) { return json::array({c.x(), c.y(), c.z()}); }
+constexpr std::size_t kMaxPolicyHypotheses = std::size_t{1} << 20;
 
 json NodeJson(const PolicyFileNode& node) {
   if (node.is_leaf()) return json{{"hypotheses", node.hypotheses}};
@@ -207,19 +204,19 @@ PolicyFile ParsePolicyFile(std::string_view text, const std::string& where) {
   document.RequireKeys({"task", "start", "expected_cost", "lower_bound", "hypotheses", "root", "nodes"});
   PolicyFile file;
   file.task = document["task"].Text();
-  file.start = document["start"].AsCell(-kMaxCoordinate, kMaxCoordinate);
+  file.start = document["start"].AsCell(-kMaxPolicyOffset, kMaxPolicyOffset);
   file.expected_cost = document["expected_cost"].Number(0.0);
   file.lower_bound = document["lower_bound"].Number(0.0);
   const JsonField hypotheses = document["hypotheses"];
-  const std::size_t hypothesis_count = hypotheses.ListSize(1, kMaxHypotheses);
+  const std::size_t hypothesis_count = hypotheses.ListSize(1, kMaxPolicyHypotheses);
   std::set<std::tuple<int, int, int, int>> seen;
   bool oriented = false;
   for (std::size_t i = 0; i < hypothesis_count; ++i) {
     const JsonField item = hypotheses[i];
     const std::size_t length = item.ListSize(3, 4);
-    const auto number = [&](std::size_t axis) { return item[axis].Integer(-kMaxCoordinate, kMaxCoordinate); };
+    const auto number = [&](std::size_t axis) { return item[axis].Integer(-kMaxPolicyOffset, kMaxPolicyOffset); };
     const Cell offset(number(0), number(1), number(2));
-    const int orientation = length == 4 ? item[3].Integer(0, kMaxCoordinate) : 0;
+    const int orientation = length == 4 ? item[3].Integer(0, kMaxPolicyOffset) : 0;
     oriented |= length == 4;
     if (!seen.emplace(offset.x(), offset.y(), offset.z(), orientation).second)
       item.Fail("is listed already", "remove one");

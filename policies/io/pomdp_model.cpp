@@ -19,7 +19,7 @@ using planner::Problem;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::array<int, 3> KeyOf(const Cell& c) { return {c.x(), c.y(), c.z()}; }
+std::array<int, 3> CellKey(const Cell& c) { return {c.x(), c.y(), c.z()}; }
 
 bool Applicable(const Problem& problem, const Cell& r, const GuardedMove& move) {
   return problem.workspace.Contains(r + move.cells * UnitCell(move.direction));
@@ -40,19 +40,19 @@ std::vector<GuardedMove> ListMoves(const Problem& problem) {
 /// Cells reachable from the start under some hypothesis, in order of discovery.
 std::vector<Cell> ListCells(const Problem& problem, const std::vector<GuardedMove>& moves, std::size_t max_cells) {
   std::vector<Cell> cells = {problem.start};
-  std::set<std::array<int, 3>> listed = {KeyOf(problem.start)};
+  std::set<std::array<int, 3>> listed = {CellKey(problem.start)};
   for (const Hypothesis& h : problem.hypotheses) {
     std::vector<Cell> open = {problem.start};
-    std::set<std::array<int, 3>> seen = {KeyOf(problem.start)};
+    std::set<std::array<int, 3>> seen = {CellKey(problem.start)};
     while (!open.empty()) {
       const Cell r = open.back();
       open.pop_back();
       for (const GuardedMove& move : moves) {
         if (!Applicable(problem, r, move)) continue;
         const Cell next = r + planner::Simulate(problem, r, move, h).cells * UnitCell(move.direction);
-        if (!seen.insert(KeyOf(next)).second) continue;
+        if (!seen.insert(CellKey(next)).second) continue;
         open.push_back(next);
-        if (listed.insert(KeyOf(next)).second) cells.push_back(next);
+        if (listed.insert(CellKey(next)).second) cells.push_back(next);
       }
     }
     if (cells.size() > max_cells) break;
@@ -215,7 +215,7 @@ PomdpModel MakePomdpModel(const Problem& problem, double upper_bound, std::size_
   for (const Hypothesis& h : problem.hypotheses) model.prior.push_back(h.weight / total_weight);
 
   std::map<std::array<int, 3>, int> index;
-  for (std::size_t i = 0; i < model.cells.size(); ++i) index[KeyOf(model.cells[i])] = static_cast<int>(i);
+  for (std::size_t i = 0; i < model.cells.size(); ++i) index[CellKey(model.cells[i])] = static_cast<int>(i);
   model.steps.reserve(model.cells.size() * per_cell);
   for (const GuardedMove& move : model.moves) {
     for (std::size_t r = 0; r < model.cells.size(); ++r) {
@@ -224,7 +224,7 @@ PomdpModel MakePomdpModel(const Problem& problem, double upper_bound, std::size_
         PomdpModel::Step step{static_cast<int>(r), -1.0};  // stays and pays the penalty, set below
         if (Applicable(problem, cell, move) && !planner::Blocked(problem, cell, h)) {
           const Outcome outcome = planner::Simulate(problem, cell, move, h);
-          const auto next = index.find(KeyOf(cell + outcome.cells * UnitCell(move.direction)));
+          const auto next = index.find(CellKey(cell + outcome.cells * UnitCell(move.direction)));
           // A cell that is free under h and yet never reached under it may lead out of the listed ones.
           if (next != index.end()) step = {next->second, problem.cost.Of(outcome)};
         }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "feeler/version.h"
+
 namespace feeler::policies {
 
 bool DatabaseSink::Done(const planner::Extents& extents) {

@@ -18,6 +18,7 @@
 #include "feeler/core/random.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/perception/input_file.h"
+#include "feeler/version.h"
 
 namespace feeler::workflow {
 namespace {

@@ -16,6 +16,8 @@
 #include "feeler/core/orientation_lattice.h"
 #include "feeler/policies/storage/database_sink.h"
 #include "feeler/policies/storage/verify.h"
+#include "feeler/version.h"
+#include "feeler/workflow/setup/bundle.h"
 
 namespace feeler::workflow {
 namespace {
@@ -92,6 +94,7 @@ DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFa
   DatabaseBuild build;
   build.summary = planner::Preprocess(setup.task(), setup.map, family, of_setup, sink);
   build.info = database.Info();
+  KeepBundle(setup, path);
   return build;
 }
 

@@ -20,8 +20,8 @@ struct DatabaseBuild {
 };
 
 /// Builds or continues the database at `path` (the main job, steps 1 and 2): solves every problem of the family that
-/// the file does not hold yet, one transaction each. Throws InputError for a file of another task or other settings, or
-/// one that cannot be written.
+/// the file does not hold yet, one transaction each; leaves the bundle of the task beside it (bundle.h). Throws
+/// InputError for a file of another task or other settings, or one that cannot be written.
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
                             const planner::PreprocessOptions& options, const std::string& path);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <mutex>
 #include <sstream>
 #include <utility>
@@ -80,13 +81,13 @@ PolicyPointer MakeOpenLoop(const PolicyRequest& /*request*/, const Shared& /*sha
 PolicyPointer MakeSpiral(const PolicyRequest& request, const Shared& shared) {
   const Task& task = request.setup.task();
   return std::make_unique<policies::SpiralPolicy>(task.insertion, task.cell_m,
-                                                  shared.options.spiral.value_or(TunedSpiral(task)));
+                                                  shared.options.spiral.value_or(DerivedSpiral(task)));
 }
 
 PolicyPointer MakeHybrid(const PolicyRequest& request, const Shared& shared) {
   const Task& task = request.setup.task();
   const double threshold_m =
-      shared.options.hybrid_threshold_m > 0.0 ? shared.options.hybrid_threshold_m : MeasuredHybridThreshold(task);
+      shared.options.hybrid_threshold_m > 0.0 ? shared.options.hybrid_threshold_m : DerivedHybridThreshold(task);
   return std::make_unique<policies::HybridPolicy>(MakeSpiral(request, shared), MakeDatabase(request, shared),
                                                   task.insertion, task.cell_m, threshold_m);
 }
@@ -162,9 +163,32 @@ constexpr Entry kPolicies[] = {
     {"visual-servoing-sift", false, false, MakeVisualSift},
 };
 
-const Entry& Find(const std::string& name) {
+/// Policies that were registered; guarded by `mutex`.
+struct Registered {
+  std::mutex mutex;
+  std::map<std::string, PolicyEntry> entries;
+};
+
+Registered& TheRegistered() {
+  static Registered registered;
+  return registered;
+}
+
+bool IsBuiltIn(const std::string& name) {
+  return std::ranges::any_of(kPolicies, [&](const Entry& entry) { return name == entry.name; });
+}
+
+/// What makes a policy, with the shared state bound to it.
+PolicyEntry Find(const std::string& name, const std::shared_ptr<const Shared>& shared = nullptr) {
   for (const Entry& entry : kPolicies) {
-    if (name == entry.name) return entry;
+    if (name != entry.name) continue;
+    return {[make = entry.make, shared](const PolicyRequest& request) { return make(request, *shared); },
+            entry.needs_database, entry.uses_ladder};
+  }
+  {
+    Registered& registered = TheRegistered();
+    const std::lock_guard lock(registered.mutex);
+    if (const auto found = registered.entries.find(name); found != registered.entries.end()) return found->second;
   }
   std::string known;
   for (const std::string& other : PolicyNames()) known += (known.empty() ? "" : ", ") + other;
@@ -191,24 +215,15 @@ constexpr Setting kSettings[] = {
     {"hybrid-threshold", [](PolicyOptions& o, double v) { o.hybrid_threshold_m = v; }},
 };
 
-struct Tuned {
-  const char* task;
-  policies::SpiralTuning spiral;
-  double hybrid_threshold_m;
-};
-
-// Measured by `feeler experiment spiral-tuning` (the spirals) and `baselines` (the thresholds, where spiral and touch
-// take the same time): docs/experiments.md. The last one serves every task that is not named.
-constexpr Tuned kTuned[] = {
-    {"plug", {0.0025, 0.08, 20.0}, 0.006},
-    {"plug-tight", {0.0006, 0.04, 20.0}, 0.0},
-};
-
-const Tuned& TunedFor(const Task& task) {
-  const auto* tuned =
-      std::find_if(std::begin(kTuned), std::end(kTuned), [&](const Tuned& t) { return task.name == t.task; });
-  return tuned == std::end(kTuned) ? *std::prev(std::end(kTuned)) : *tuned;
-}
+/// The press of a spiral search: at 10 N friction and chamfer hold half of the tools back, at 40 N friction slows all
+/// (`feeler experiment spiral-tuning`, on both sockets).
+constexpr double kSpiralPressN = 20.0;
+/// With that press a tool sinks into the opening as if it fell with this acceleration, m/s^2: what the fastest spiral
+/// without misses on the plug's socket comes to, and on the tight one too.
+constexpr double kSinkingMS2 = 6.4;
+/// Half widths of the uncertainty, in tolerances, up to which a spiral is quicker than touch (`feeler experiment
+/// baselines`: 6 mm on the plug at 1 mm; nowhere on the tight socket, whose smallest problem is 6.7 wide).
+constexpr double kSpiralReach = 6.0;
 
 }  // namespace
 
@@ -235,12 +250,28 @@ PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings) {
   return options;
 }
 
-policies::SpiralTuning TunedSpiral(const Task& task) { return TunedFor(task).spiral; }
-double MeasuredHybridThreshold(const Task& task) { return TunedFor(task).hybrid_threshold_m; }
+policies::SpiralTuning DerivedSpiral(const Task& task) {
+  const double catch_m = task.tolerance.lateral_m;
+  return {.pitch_m = 2.0 * catch_m, .speed_m_s = std::sqrt(kSinkingMS2 * catch_m), .press_n = kSpiralPressN};
+}
+
+double DerivedHybridThreshold(const Task& task) { return kSpiralReach * task.tolerance.lateral_m; }
+
+void RegisterPolicy(const std::string& name, PolicyEntry entry) {
+  Registered& registered = TheRegistered();
+  const std::lock_guard lock(registered.mutex);
+  if (name.empty() || !entry.make) throw InputError("policy \"" + name + "\"", "has no name or no maker", "give both");
+  if (IsBuiltIn(name) || !registered.entries.emplace(name, std::move(entry)).second) {
+    throw InputError("policy \"" + name + "\"", "is known already", "register it under another name");
+  }
+}
 
 std::vector<std::string> PolicyNames() {
   std::vector<std::string> names;
   for (const Entry& entry : kPolicies) names.emplace_back(entry.name);
+  Registered& registered = TheRegistered();
+  const std::lock_guard lock(registered.mutex);
+  for (const auto& [name, entry] : registered.entries) names.push_back(name);
   return names;
 }
 
@@ -248,12 +279,12 @@ bool UsesLadder(const std::string& name) { return Find(name).uses_ladder; }
 
 PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database,
                                 const PolicyOptions& options) {
-  const Entry& entry = Find(name);
-  if (entry.needs_database && !database) {
+  const bool has_database = database != nullptr;
+  const PolicyEntry entry = Find(name, std::make_shared<const Shared>(Shared{std::move(database), options}));
+  if (entry.needs_database && !has_database) {
     throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
   }
-  const auto shared = std::make_shared<const Shared>(Shared{std::move(database), options});
-  return [make = entry.make, shared](const PolicyRequest& request) { return make(request, *shared); };
+  return entry.make;
 }
 
 }  // namespace feeler::workflow

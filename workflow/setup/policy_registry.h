@@ -34,19 +34,29 @@ using PolicyFactory = std::function<std::unique_ptr<policies::Policy>(const Poli
 struct PolicyOptions {
   int tbl_actions = 100;  ///< sampled per planning step by touch-based localization; 0: every action
   policies::OnlineOptions online;
-  std::optional<policies::SpiralTuning> spiral;  ///< default: as tuned for the task (TunedSpiral)
-  double hybrid_threshold_m = 0.0;               ///< half width of the uncertainty; 0: as measured for the task
+  std::optional<policies::SpiralTuning> spiral;  ///< default: as derived for the task (DerivedSpiral)
+  double hybrid_threshold_m = 0.0;               ///< half width of the uncertainty; 0: DerivedHybridThreshold
 };
 /// Parses "key=value" settings of `--policy-option`: tbl-actions, online-seconds, online-expansions, spiral-pitch,
 /// spiral-speed, spiral-force, hybrid-threshold. Throws InputError listing the keys for an unknown one.
 PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings);
 
-/// Settings for the socket of a task, to be taken from `feeler experiment spiral-tuning`; for other tasks those of the
-/// tightest socket.
-policies::SpiralTuning TunedSpiral(const Task& task);
-/// Below this half width of the uncertainty `hybrid` spirals on the socket of a task; to be taken from where the curves
-/// of `feeler experiment baselines` cross.
-double MeasuredHybridThreshold(const Task& task);
+/// The spiral for the socket of a task, derived from what it catches, its lateral tolerance: turns two tolerances apart
+/// pass every place within one, and the tool sinks in while it crosses that width (under a constant press the time
+/// grows as its root, so the speed does). docs/experiments.md holds the measurements.
+policies::SpiralTuning DerivedSpiral(const Task& task);
+/// Below this half width of the uncertainty `hybrid` spirals: six lateral tolerances.
+double DerivedHybridThreshold(const Task& task);
+
+/// How a policy is made, and what it asks for.
+struct PolicyEntry {
+  PolicyFactory make;
+  bool needs_database = false;
+  bool uses_ladder = true;  ///< see UsesLadder
+};
+/// Adds a policy of one's own under a name, for MakePolicyFactory and all that takes names (runs, experiments). Throws
+/// InputError if the name is taken, empty, or the entry makes nothing. Safe from any thread.
+void RegisterPolicy(const std::string& name, PolicyEntry entry);
 
 /// Names that `MakePolicyFactory` knows.
 std::vector<std::string> PolicyNames();

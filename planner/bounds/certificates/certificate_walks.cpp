@@ -10,7 +10,7 @@
 namespace feeler::planner {
 namespace {
 
-constexpr std::uint32_t kInfinite = ~std::uint32_t{0};
+constexpr std::uint32_t kNoWalk = ~std::uint32_t{0};
 
 /// Dijkstra's algorithm over whole numbers: what is queued at a cost comes out in order of cost.
 class BucketQueue {
@@ -39,7 +39,7 @@ void FillByMotions(const CertificateWalks& walks, std::uint32_t mask, std::uint1
                    std::vector<std::uint32_t>& cost, BucketQueue& queue) {
   const std::size_t cells = walks.enters.size();
   constexpr std::uint32_t kAtRest = kDirectionCount;
-  cost.assign(cells * (kDirectionCount + 1), kInfinite);
+  cost.assign(cells * (kDirectionCount + 1), kNoWalk);
   const auto relax = [&](std::uint32_t kind, std::uint32_t cell, std::uint32_t value) {
     const auto state = static_cast<std::uint32_t>(kind * cells + cell);
     value = std::min<std::uint32_t>(value, kNoCertificate - 1);
@@ -93,7 +93,7 @@ void FillCertificates(const CertificateWalks& walks, int bits, std::uint16_t* pl
       FillByMotions(walks, mask, planes, cost, buckets);
       continue;
     }
-    std::ranges::fill(cost, kInfinite);
+    std::ranges::fill(cost, kNoWalk);
     seeds.clear();
     for (const CertificateWalks::Probe& probe : walks.probes) {
       if ((probe.shows & mask) == 0) continue;
@@ -113,7 +113,7 @@ void FillCertificates(const CertificateWalks& walks, int bits, std::uint16_t* pl
     });
     std::uint16_t* const plane = planes + mask * cells;
     for (std::size_t i = 0; i < cells; ++i) {
-      plane[i] = cost[i] == kInfinite
+      plane[i] = cost[i] == kNoWalk
                      ? kNoCertificate
                      : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNoCertificate - 1));
     }

@@ -1,0 +1,16 @@
+# cpack -G DEB: the binary, the libraries, the headers and the run-time data in one Debian package.
+set(CPACK_PACKAGE_NAME feeler)
+set(CPACK_PACKAGE_VENDOR "The Feeler authors")
+set(CPACK_PACKAGE_CONTACT "The Feeler authors <feeler@example.org>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "High-precision insertions by touch: planning, execution, simulation")
+set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS "libgl1-mesa-dri")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "ffmpeg, libjs-three, node-d3")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS
+    "cmake, g++, libmujoco-dev, libeigen3-dev, libompl-dev, liburdfdom-dev, libtinyxml2-dev, libsqlite3-dev, zlib1g-dev, nlohmann-json3-dev, libspdlog-dev, libfmt-dev, libtbb-dev, libopencv-core-dev, libopencv-imgproc-dev, libopencv-features2d-dev, libopencv-imgcodecs-dev, libnanoflann-dev, libegl-dev")
+set(CPACK_STRIP_FILES ON)
+include(CPack)
