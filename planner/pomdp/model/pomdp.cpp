@@ -11,7 +11,7 @@ namespace feeler::planner {
 namespace {
 
 /// Costs and sums of probabilities below this are rounding.
-constexpr double kNothing = 1e-12;
+constexpr double kNegligible = 1e-12;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ std::vector<std::uint8_t> AbsorbingStates(const Pomdp& pomdp) {
     for (std::size_t s = 0; s < pomdp.state_count(); ++s) {
       const auto row = pomdp.transitions.Row(pomdp.At(a, s));
       const bool stays = row.size() == 1 && row[0].index == s;
-      if (!stays || std::abs(pomdp.reward[pomdp.At(a, s)]) > kNothing) absorbing[s] = 0;
+      if (!stays || std::abs(pomdp.reward[pomdp.At(a, s)]) > kNegligible) absorbing[s] = 0;
     }
   }
   return absorbing;
@@ -103,7 +103,7 @@ void RequireSolvable(const Pomdp& pomdp) {
   }
   for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
     for (std::size_t s = 0; s < pomdp.state_count(); ++s) {
-      if (pomdp.reward[pomdp.At(a, s)] <= kNothing) continue;
+      if (pomdp.reward[pomdp.At(a, s)] <= kNegligible) continue;
       throw InputError(
           pomdp.name,
           fmt::format("a discount of 1, and action \"{}\" in state \"{}\" earns {:g}: costs and rewards mixed",
