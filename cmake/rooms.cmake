@@ -41,6 +41,10 @@ function(feeler_unity target)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # Members whose type only one source file knows: harmless, but warned of where that file is included by another.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
 endfunction()
 
 set(FEELER_COMPONENTS "" CACHE INTERNAL "Installed rooms")
