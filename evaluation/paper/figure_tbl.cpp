@@ -174,7 +174,7 @@ bool MeasureAll(const World& world, const std::vector<Cell>& cells, const Experi
 std::vector<double> Values(const json& cell, const char* key) { return cell.at(key).get<std::vector<double>>(); }
 
 /// Cost relative to the database policy over the truths that both walked from.
-Estimate RelativeCost(const json& cell, const json& reference) {
+Estimate CostRelativeTo(const json& cell, const json& reference) {
   std::vector<double> costs = Values(cell, "costs");
   std::vector<double> base = Values(reference, "costs");
   base.resize(std::min(base.size(), costs.size()));
@@ -237,7 +237,7 @@ ExperimentResult RunFigureTbl(const ExperimentRequest& request) {
     for (const auto& [reason, count] : value.at("failures").items()) failed += count.get<int>();
     const int walks = static_cast<int>(costs.size());
     const auto hypotheses = value.at("hypotheses").get<double>();
-    const Estimate cost_ratio = RelativeCost(value, reference);
+    const Estimate cost_ratio = CostRelativeTo(value, reference);
     const Estimate cpu = BootstrapMean(Values(value, "cpu_s"));
     const double moves = Mean(Values(value, "moves"));
     const std::string cost_name(ToString(cell.cost));
