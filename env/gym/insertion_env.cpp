@@ -107,7 +107,9 @@ Pose NominalStartPose(const Task& task, const Pose& world_T_estimate) {
 }
 
 InsertionEnv::InsertionEnv(std::shared_ptr<const Scene> scene, const EnvOptions& options)
-    : options_(options), robot_(std::move(scene), options.robot), limits_(options.limits.value_or(LimitsOf(task()))) {}
+    : options_(options),
+      robot_(std::move(scene), options.robot),
+      limits_(options.limits.value_or(LimitsOf(robot_.world().scene()))) {}
 
 void InsertionEnv::PlaceRobot(const Pose& world_T_target, const ResetOptions& options, const NoiseOptions& noise,
                               const RandomStream& random) {

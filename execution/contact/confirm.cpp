@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "feeler/execution/contact/continuous_travel.h"
 #include "feeler/execution/contact/free_path.h"
 
 namespace feeler::execution {
@@ -43,6 +44,30 @@ bool IsBroadWall(const planner::ContactMap& map, const Cell& from, Direction dir
   return true;
 }
 
+/// Contacts per axis across the insertion that met flat ground: the lines beside the touch, to both sides across the
+/// insertion, meet the same wall. Nearer to an edge of tool or target, a bevel or round narrower than a cell is read
+/// instead of the wall, and the contact map does not show it.
+std::array<int, 3> ContactsOnFlatGround(const planner::ContactMap& map, const std::vector<Touch>& evidence,
+                                        const TargetFit& fit, Direction insertion, int orientation,
+                                        const FitOptions& options) {
+  std::array<int, 3> contacts{};
+  for (const Touch& touch : evidence) {
+    const int axis = AxisOf(touch.direction);
+    if (!touch.contact || touch.is_oblique() || axis == AxisOf(insertion)) continue;
+    const Eigen::Vector3d displacement = touch.start - fit.position;
+    const auto travel_beside = [&](int cells) {
+      Eigen::Vector3d line = displacement;
+      line[3 - axis - AxisOf(insertion)] += cells;
+      return ContinuousTravel(map, line, touch.direction, orientation);
+    };
+    const double travel = travel_beside(0);
+    if (std::abs(touch.travelled - travel) > options.violation_cells + options.step_cells) continue;
+    if (std::abs(travel_beside(1) - travel) > kSameWall || std::abs(travel_beside(-1) - travel) > kSameWall) continue;
+    ++contacts[static_cast<std::size_t>(axis)];
+  }
+  return contacts;
+}
+
 TargetFit BestFit(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Region& likely,
                   const Region& possible, int orientation, const FitOptions& options) {
   const TargetFit near = FitTarget(map, evidence, likely.lower, likely.upper, orientation, options);
@@ -54,13 +79,14 @@ TargetFit BestFit(const planner::ContactMap& map, const std::vector<Touch>& evid
 /// The axis across the insertion that is most in need of a touch; -1 if none is. An axis that no face has pinned is
 /// felt even where edges and slanted walls leave it narrow: what they tell hangs on the other axes, and one edge met on
 /// the wrong side of a tie would put the whole estimate off by cells.
-int LoosestAxis(const TargetFit& fit, Direction insertion, const std::array<bool, 3>& hopeless, int contacts_wanted) {
+int LoosestAxis(const TargetFit& fit, const std::array<int, 3>& contacts, Direction insertion,
+                const std::array<bool, 3>& hopeless, int contacts_wanted) {
   int loosest = -1;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    if (axis == AxisOf(insertion) || fit.contacts[i] >= contacts_wanted || hopeless[i]) continue;
-    if (loosest < 0 || fit.contacts[i] < fit.contacts[static_cast<std::size_t>(loosest)] ||
-        (fit.contacts[i] == fit.contacts[static_cast<std::size_t>(loosest)] &&
+    if (axis == AxisOf(insertion) || contacts[i] >= contacts_wanted || hopeless[i]) continue;
+    if (loosest < 0 || contacts[i] < contacts[static_cast<std::size_t>(loosest)] ||
+        (contacts[i] == contacts[static_cast<std::size_t>(loosest)] &&
          fit.half_width[axis] > fit.half_width[loosest])) {
       loosest = axis;
     }
@@ -131,7 +157,8 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
   const int contacts_wanted = ContactsWanted(options);
   const int attempts = options.confirm_attempts + 2 * (contacts_wanted - 1);
   for (int attempt = 0; attempt < attempts; ++attempt) {
-    const int axis = LoosestAxis(fit, insertion, hopeless, contacts_wanted);
+    const std::array<int, 3> contacts = ContactsOnFlatGround(map, evidence, fit, insertion, orientation, options.fit);
+    const int axis = LoosestAxis(fit, contacts, insertion, hopeless, contacts_wanted);
     if (axis < 0) break;
     const auto plan = PlanConfirmingTouch(map, mover.position() - fit.position, axis, orientation);
     if (!plan) {

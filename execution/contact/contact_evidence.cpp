@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <optional>
 
 #include "feeler/execution/contact/continuous_travel.h"
 
@@ -66,14 +68,16 @@ std::vector<double> GridValues(double lower, double upper, double step) {
   return values;
 }
 
-/// True if the wall met from `displacement` is square to the motion around the place of contact: the neighbouring lines
-/// meet it at the same travel, or miss it. A slanted wall (a bevel, a round side) tells about two axes at once and pins
-/// neither.
-bool IsSquareWall(const planner::ContactMap& map, const Eigen::Vector3d& displacement, Direction direction,
-                  int orientation) {
+/// How many of the four neighbouring lines miss the wall that is met from `displacement` (at most one to each side of
+/// an axis); nothing for a slanted wall, which a neighbouring line meets at another travel: a bevel or a round side
+/// tells about two axes at once and pins neither. Where lines miss, an edge is near, and an edge cut narrower than a
+/// cell may have been met instead of the wall.
+std::optional<int> EdgesNear(const planner::ContactMap& map, const Eigen::Vector3d& displacement, Direction direction,
+                             int orientation) {
   constexpr double kSame = 0.2;
   constexpr double kMiss = 6.0;
   const double travel = ContinuousTravel(map, displacement, direction, orientation);
+  int edges = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (axis == AxisOf(direction)) continue;
     int same = 0;
@@ -84,33 +88,42 @@ bool IsSquareWall(const planner::ContactMap& map, const Eigen::Vector3d& displac
       if (std::abs(off) <= kSame) {
         ++same;
       } else if (off < kMiss) {
-        return false;
+        return std::nullopt;
       }
     }
-    if (same == 0) return false;
+    if (same == 0) return std::nullopt;
+    if (same == 1) ++edges;
   }
-  return true;
+  return edges;
 }
 
-/// Moves each axis onto the contacts that agree with `fit.position`; marks the axes that have any.
+/// Moves each axis onto the contacts that agree with `fit.position`, those alone that are farthest from edges; marks
+/// the axes that have any.
 void SnapToContacts(const planner::ContactMap& map, const std::vector<Touch>& evidence, int orientation,
                     const FitOptions& options, TargetFit& fit) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Vector3d count = Eigen::Vector3d::Zero();
+  constexpr int kMostEdges = 2;
+  std::array<std::array<double, kMostEdges + 1>, 3> sum{};
+  std::array<std::array<int, kMostEdges + 1>, 3> count{};
   for (const Touch& touch : evidence) {
     if (!touch.contact || touch.is_oblique()) continue;
     const double travel = ContinuousTravel(map, touch.start - fit.position, touch.direction, orientation);
     const double residual = touch.travelled - travel;
     // The grid and its plateau centre add their own error to that of the reading.
     if (std::abs(residual) > options.violation_cells + options.step_cells) continue;
-    if (!IsSquareWall(map, touch.start - fit.position, touch.direction, orientation)) continue;
-    sum[AxisOf(touch.direction)] += SignOf(touch.direction) * residual;
-    count[AxisOf(touch.direction)] += 1.0;
+    const auto edges = EdgesNear(map, touch.start - fit.position, touch.direction, orientation);
+    if (!edges) continue;
+    const auto axis = static_cast<std::size_t>(AxisOf(touch.direction));
+    sum[axis][static_cast<std::size_t>(*edges)] += SignOf(touch.direction) * residual;
+    ++count[axis][static_cast<std::size_t>(*edges)];
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    fit.pinned[static_cast<std::size_t>(axis)] = count[axis] > 0.0;
-    fit.contacts[static_cast<std::size_t>(axis)] = static_cast<int>(count[axis]);
-    if (count[axis] > 0.0) fit.position[axis] += sum[axis] / count[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    fit.contacts[axis] = std::accumulate(count[axis].begin(), count[axis].end(), 0);
+    fit.pinned[axis] = fit.contacts[axis] > 0;
+    for (std::size_t edges = 0; edges <= kMostEdges; ++edges) {
+      if (count[axis][edges] == 0) continue;
+      fit.position[static_cast<Eigen::Index>(axis)] += sum[axis][edges] / count[axis][edges];
+      break;
+    }
   }
 }
 

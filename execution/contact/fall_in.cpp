@@ -15,6 +15,9 @@ constexpr double kReach = 1.25;
 /// Out of the opening the tool stands this far above the highest mouth, in cells.
 constexpr double kAbove = 2.0;
 
+/// A wall of the opening is felt for up to this many shortfalls behind where the tolerance says it stands.
+constexpr double kBehindWall = 5.0;
+
 std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Problem& problem,
                                             const Eigen::Vector3d& tool) {
   const Eigen::Vector3d inward = UnitVector(task.insertion);
@@ -34,7 +37,9 @@ std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Pro
 
 /// Middle between the walls on both sides along `axis`; empty if one is missing. The tool ends in the middle.
 std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& mover) {
-  const double range = mover.Cells(2.0 * task.tolerance.lateral_m);
+  // What the clearance allows is at least the tolerance; a wall is told at the latest by the shortfall of a motion that
+  // goes on well behind it.
+  const double range = mover.Cells(2.0 * task.tolerance.lateral_m + kBehindWall * mover.options().shortfall_m);
   const Eigen::Vector3d begun = mover.position();
   std::array<double, 2> walls{};
   for (const int sign : {1, -1}) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "feeler/execution/contact/confirm.h"
@@ -54,10 +55,37 @@ BelievedInsertion ApproachAndInsert(const Task& task, const planner::ContactMap&
     }
   }
   mover.ZeroWrench();
-  return InsertFromHere(task, target, mover);
+  return InsertFromHere(task, target, FarthestInside(task, map, orientation, mover.frame().cell_m), mover);
 }
 
-BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, Mover& mover) {
+double FarthestInside(const Task& task, const planner::ContactMap& map, int orientation, double cell_m) {
+  const int along = AxisOf(task.insertion);
+  const Cell deep = Nearest(task.insertion_depth_m / cell_m * UnitVector(task.insertion) - map.phase());
+  const Cell size = map.domain().max - map.domain().min;
+  const int u = (along + 1) % 3;
+  const int v = (along + 2) % 3;
+  const int widest = std::max(size[u], size[v]);
+  int ring = 0;
+  const auto clear_on = [&](int cells) {
+    for (int i = -cells; i <= cells; ++i) {
+      for (const int side : {-cells, cells}) {
+        Cell one = deep;
+        one[u] += i;
+        one[v] += side;
+        Cell other = deep;
+        other[u] += side;
+        other[v] += i;
+        if (!map.Blocked(one, orientation) || !map.Blocked(other, orientation)) return true;
+      }
+    }
+    return false;
+  };
+  while (ring < widest && !clear_on(ring)) ++ring;
+  return std::max(0.5 * ring, 2.0 * task.tolerance.lateral_m / cell_m);
+}
+
+BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, double farthest_inside,
+                                 Mover& mover) {
   const Eigen::Vector3d out = -UnitVector(task.insertion);
   const double depth = mover.Cells(task.insertion_depth_m);
   const double overdrive = mover.Cells(mover.options().insertion_overdrive_m);
@@ -72,8 +100,7 @@ BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target
             fmt::format("insertion: stopped after {:.2f} of {:.2f} mm ({})", 1e3 * reached * cell_m,
                         1e3 * task.insertion_depth_m, ToString(report.reason))};
   }
-  // An axis that is wrong by more than the tolerance and still at depth is beside the opening, not in it.
-  if (lateral.cwiseAbs().maxCoeff() * cell_m > 2.0 * task.tolerance.lateral_m) {
+  if (lateral.cwiseAbs().maxCoeff() > farthest_inside) {
     return {false, true,
             fmt::format("insertion: at depth, but {:.2f} mm beside the opening",
                         1e3 * lateral.cwiseAbs().maxCoeff() * cell_m)};

@@ -25,7 +25,14 @@ struct BelievedInsertion {
 BelievedInsertion ApproachAndInsert(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
                                     int orientation, Mover& mover, std::vector<Touch>& evidence);
 
-/// The part of it that begins in front of the opening, or in its mouth.
-BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, Mover& mover);
+/// How far from the estimate, across the insertion, a tool at depth is still in the opening and not beside the target,
+/// in cells: half of the way to the nearest place beside it where the contact map, whose opening is closed, lets the
+/// tool stand as deep. Inside a target there is no other place for a tool than the opening. At least twice the
+/// tolerance.
+double FarthestInside(const Task& task, const planner::ContactMap& map, int orientation, double cell_m);
+
+/// The part of it that begins in front of the opening, or in its mouth. A tool at depth that stands farther than
+/// `farthest_inside` (cells, FarthestInside) from the estimate is beside the opening.
+BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, double farthest_inside, Mover& mover);
 
 }  // namespace feeler::execution

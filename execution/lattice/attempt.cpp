@@ -60,7 +60,8 @@ Eigen::Vector3d Mean(const std::vector<TrackedHypothesis>& tracked) {
 }
 
 /// Spirals around the middle of the hypotheses left, and inserts where the tool drops in.
-void SearchAndInsert(const Episode& episode, const policies::SpiralSearch& search, Mover& mover, Attempt& attempt) {
+void SearchAndInsert(const Episode& episode, const planner::ContactMap& map, const policies::SpiralSearch& search,
+                     Mover& mover, Attempt& attempt) {
   const Task& task = episode.task;
   ExecutionRecord& record = episode.record;
   for (const double value : {search.radius_m, search.pitch_m, search.speed_m_s, search.press_n, search.face_range_m}) {
@@ -79,8 +80,9 @@ void SearchAndInsert(const Episode& episode, const policies::SpiralSearch& searc
   attempt.target = found->target;
   record.localized = true;
   record.world_T_estimate = attempt.frame.ToWorld(found->target);
-  const BelievedInsertion verdict =
-      found->at_bottom ? BelievedInsertion{true, false, "inserted"} : InsertFromHere(task, found->target, mover);
+  const double farthest_inside = FarthestInside(task, map, attempt.orientation, task.cell_m);
+  const BelievedInsertion verdict = found->at_bottom ? BelievedInsertion{true, false, "inserted"}
+                                                     : InsertFromHere(task, found->target, farthest_inside, mover);
   record.inserted = verdict.inserted;
   attempt.reason = verdict.reason;
   attempt.end = verdict.inserted ? AttemptEnd::kInserted : AttemptEnd::kBlocked;
@@ -104,7 +106,7 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
   attempt.evidence = localizer.evidence();
   attempt.target = Mean(left);
   if (const auto* search = std::get_if<policies::SpiralSearch>(&decision)) {
-    return SearchAndInsert(episode, *search, mover, attempt);
+    return SearchAndInsert(episode, *problem.map, *search, mover, attempt);
   }
   if (std::holds_alternative<policies::Servo>(decision)) {
     decision = FollowByEye(problem, decision, policy, mover, record);

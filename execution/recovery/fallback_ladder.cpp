@@ -157,7 +157,7 @@ void SweepYaw(const Episode& episode, const planner::Problem& problem, Attempt& 
   }
 }
 
-void Spiral(const Episode& episode, Attempt& attempt) {
+void Spiral(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
   Log(episode, rung::kSpiral, attempt.reason);
   Mover mover = MoverFor(episode, attempt.frame);
   ComeOff(episode.task, *attempt.target, mover);
@@ -167,9 +167,10 @@ void Spiral(const Episode& episode, Attempt& attempt) {
     attempt.reason = "spiral: no opening found";
     return;
   }
+  const double farthest_inside = FarthestInside(episode.task, *problem.map, attempt.orientation, episode.task.cell_m);
   Conclude(episode, attempt.frame, found->target,
            found->at_bottom ? BelievedInsertion{true, false, "inserted"}
-                            : InsertFromHere(episode.task, found->target, mover),
+                            : InsertFromHere(episode.task, found->target, farthest_inside, mover),
            attempt);
 }
 
@@ -177,7 +178,7 @@ void TryAtMouth(const Episode& episode, const planner::Problem& problem, Attempt
   try {
     FitYaw(episode, problem, attempt);
     if (attempt.end == AttemptEnd::kBlocked) SweepYaw(episode, problem, attempt);
-    if (attempt.end == AttemptEnd::kBlocked) Spiral(episode, attempt);
+    if (attempt.end == AttemptEnd::kBlocked) Spiral(episode, problem, attempt);
   } catch (const LostTrack& lost) {
     attempt.end = AttemptEnd::kLost;
     attempt.reason = lost.what();

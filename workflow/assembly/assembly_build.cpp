@@ -146,6 +146,7 @@ class Builder {
     for (const AssemblyPart& part : assembly.parts) poses_.push_back(part.world_T_part);
     for (const auto& [name, task] : tasks) {
       travel_.emplace(name, env::MakeExactTravel(task.setup->model, env::Opening::kOpen));
+      limits_.emplace(name, env::LimitsOf(task.setup->task(), env::PiecesOf(task.setup->model, env::Opening::kOpen)));
     }
     record_.assembly = assembly.name;
     record_.seed = options.seed;
@@ -299,7 +300,7 @@ class Builder {
 
     // The score: from here on the truth may be looked at.
     const env::InsertionVerdict verdict =
-        env::JudgeInsertion(task, env::LimitsOf(task), stage.robot().world().ToolPose(), step.world_T_true,
+        env::JudgeInsertion(task, limits_.at(insertion.task), stage.robot().world().ToolPose(), step.world_T_true,
                             stage.robot().statistics().peak_force_n, stage.robot().Time() - started_s);
     if (attempt.execution.world_T_estimate) {
       attempt.error = PoseErrorOf(task, step.world_T_true, *attempt.execution.world_T_estimate);
@@ -342,6 +343,7 @@ class Builder {
   const AssemblyTasks& tasks_;
   const AssemblyOptions& options_;
   std::map<std::string, std::shared_ptr<planner::TravelModel>> travel_;
+  std::map<std::string, env::InsertionLimits> limits_;
   std::vector<Pose> poses_;  ///< where every part truly is
   std::optional<env::JointVector> q_rad_;
   double clock_s_ = 0.0;

@@ -9,12 +9,9 @@
 namespace feeler::workflow {
 namespace {
 
-/// How far outside the box of possible positions the noise `outside` puts the target.
-constexpr double kNearestOutside_m = 0.0005;
-constexpr double kFarthestOutside_m = 0.004;
-
 /// Moves the truth beyond one side of the box, chosen among those of the uncertain positions.
-void MoveOutside(const Task& task, const planner::Extents& cuboid, RandomStream& random, EpisodeDraw& draw) {
+void MoveOutside(const Task& task, const planner::Extents& cuboid, const EpisodeFaults& faults, RandomStream& random,
+                 EpisodeDraw& draw) {
   std::vector<const UncertainAxis*> axes;
   for (const UncertainAxis& axis : task.axes) {
     if (!axis.angular()) axes.push_back(&axis);
@@ -23,7 +20,7 @@ void MoveOutside(const Task& task, const planner::Extents& cuboid, RandomStream&
   const UncertainAxis& axis = *axes[random.Index(axes.size())];
   const int i = static_cast<int>(axis.kind);
   const double side = random.Index(2) == 0 ? -1.0 : 1.0;
-  const double beyond = random.Uniform(kNearestOutside_m, kFarthestOutside_m);
+  const double beyond = random.Uniform(faults.outside_least_m, faults.outside_most_m);
   Eigen::Vector3d offset = (draw.world_T_estimate.inverse() * draw.world_T_true).translation();
   offset[i] = side * (0.5 * cuboid[i] * axis.resolution + beyond);
   draw.world_T_true.translation() = draw.world_T_estimate * offset;
@@ -51,7 +48,7 @@ EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, 
   draw.world_T_true = env::DrawTruePose(task, draw.world_T_estimate, AxisExtents(task, draw.extents), truth);
   if (noise.outside) {
     RandomStream outside(seed, episode, "truth outside");
-    MoveOutside(task, draw.extents, outside, draw);
+    MoveOutside(task, draw.extents, noise, outside, draw);
   }
   draw.world_T_true = TurnedByFault(task, noise, seed, episode, draw.world_T_true);
   return draw;
@@ -60,9 +57,13 @@ EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, 
 Pose TurnedByFault(const Task& task, const EpisodeFaults& noise, std::uint64_t seed, std::uint64_t episode,
                    const Pose& world_T_target) {
   if (noise.yaw_error_rad == 0.0) return world_T_target;
-  const double side = RandomStream(seed, episode, "yaw error").Index(2) == 0 ? -1.0 : 1.0;
+  RandomStream random(seed, episode, "yaw error");
+  const double side = random.Index(2) == 0 ? -1.0 : 1.0;
+  const double angle_rad = noise.yaw_error_least_rad < noise.yaw_error_rad
+                               ? random.Uniform(noise.yaw_error_least_rad, noise.yaw_error_rad)
+                               : noise.yaw_error_rad;
   Pose turned = world_T_target;
-  turned.linear() = turned.linear() * Eigen::AngleAxisd(side * noise.yaw_error_rad, -UnitVector(task.insertion));
+  turned.linear() = turned.linear() * Eigen::AngleAxisd(side * angle_rad, -UnitVector(task.insertion));
   return turned;
 }
 

@@ -23,21 +23,29 @@ struct WorldNoise {
   void (*add)(EpisodeFaults& noise);
 };
 
-void AddYaw(EpisodeFaults& noise, double degrees) {
+void AddYaw(EpisodeFaults& noise, double least_degrees, double most_degrees) {
   if (noise.yaw_error_rad > 0.0) throw InputError("noise", "two yaw errors", "give one of them");
-  noise.yaw_error_rad = degrees * kDegree;
+  noise.yaw_error_rad = most_degrees * kDegree;
+  noise.yaw_error_least_rad = least_degrees * kDegree;
+}
+
+void AddOutside(EpisodeFaults& noise, double least_mm, double most_mm) {
+  if (noise.outside) throw InputError("noise", "two distances outside the box", "give one of them");
+  noise.outside = true;
+  noise.outside_least_m = 1e-3 * least_mm;
+  noise.outside_most_m = 1e-3 * most_mm;
 }
 
 constexpr WorldNoise kWorldNoises[] = {
     {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
-     [](EpisodeFaults& n) { n.outside = true; }},
+     [](EpisodeFaults& n) { AddOutside(n, 0.5, 4.0); }},
     {"fall-in", "the target stands where a probe of the policy falls into the opening",
      [](EpisodeFaults& n) { n.fall_in = true; }},
     {"oversize", "the sides of the target stand 0.5 mm farther out than in the model",
      [](EpisodeFaults& n) { n.oversize_m = 0.0005; }},
-    {"yaw-1", "the target is turned by 1 degree, either way", [](EpisodeFaults& n) { AddYaw(n, 1.0); }},
-    {"yaw-2", "the target is turned by 2 degrees", [](EpisodeFaults& n) { AddYaw(n, 2.0); }},
-    {"yaw-3", "the target is turned by 3 degrees", [](EpisodeFaults& n) { AddYaw(n, 3.0); }},
+    {"yaw-1", "the target is turned by 1 degree, either way", [](EpisodeFaults& n) { AddYaw(n, 1.0, 1.0); }},
+    {"yaw-2", "the target is turned by 2 degrees", [](EpisodeFaults& n) { AddYaw(n, 2.0, 2.0); }},
+    {"yaw-3", "the target is turned by 3 degrees", [](EpisodeFaults& n) { AddYaw(n, 3.0, 3.0); }},
 };
 
 /// Names with a number, "force-noise=2".
@@ -64,8 +72,47 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
     {"stiffness", "stiffness of each joint between encoder and link, Nm/rad (a UR10e has some 50000)", 1e4, 1e9,
      [](EpisodeFaults& n, double stiffness) { n.robot.joint_stiffness_nm_rad = stiffness; }},
     {"yaw", "the target is turned by so many degrees, either way", 0.0, 30.0,
-     [](EpisodeFaults& n, double degrees) { AddYaw(n, degrees); }},
+     [](EpisodeFaults& n, double degrees) { AddYaw(n, degrees, degrees); }},
+    {"outside", "the target stands so many mm outside the box of hypotheses on one axis", 0.0, 100.0,
+     [](EpisodeFaults& n, double mm) { AddOutside(n, mm, mm); }},
 };
+
+/// Names with a range, "yaw=0..5": the value is drawn uniformly per episode.
+struct DrawnNoise {
+  const char* name;
+  double least;
+  double most;
+  void (*add)(EpisodeFaults& noise, double from, double to);
+};
+
+constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw}, {"outside", 0.0, 100.0, AddOutside}};
+
+bool ReadNumber(const std::string& text, double& value) {
+  std::istringstream number(text);
+  return static_cast<bool>(number >> value) && number.eof();
+}
+
+/// Takes "NAME=FROM..TO" with a name of kDrawnNoises; false for any other text.
+bool AddDrawn(const std::string& text, EpisodeFaults& noise) {
+  const std::size_t equals = text.find('=');
+  const std::size_t dots = text.find("..");
+  if (equals == std::string::npos || dots == std::string::npos || dots < equals) return false;
+  const std::string name = text.substr(0, equals);
+  for (const DrawnNoise& drawn : kDrawnNoises) {
+    if (name != drawn.name) continue;
+    double from = 0.0;
+    double to = 0.0;
+    if (!ReadNumber(text.substr(equals + 1, dots - equals - 1), from) || !ReadNumber(text.substr(dots + 2), to) ||
+        !(from >= drawn.least && from <= to && to <= drawn.most)) {
+      throw InputError("noise", "'" + text + "' has no sensible range",
+                       fmt::format("give {}=FROM..TO within {} to {}", name, drawn.least, drawn.most));
+    }
+    drawn.add(noise, from, to);
+    return true;
+  }
+  throw InputError("noise", "'" + text + "': " + name + " takes no range",
+                   "yaw and outside take one, FROM..TO; give a number");
+}
 
 /// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.
 bool AddMeasured(const std::string& text, EpisodeFaults& noise) {
@@ -74,9 +121,8 @@ bool AddMeasured(const std::string& text, EpisodeFaults& noise) {
   const std::string name = text.substr(0, equals);
   for (const MeasuredNoise& measured : kMeasuredNoises) {
     if (name != measured.name) continue;
-    std::istringstream number(text.substr(equals + 1));
     double value = 0.0;
-    if (!(number >> value) || !number.eof() || !(value >= measured.least && value <= measured.most)) {
+    if (!ReadNumber(text.substr(equals + 1), value) || !(value >= measured.least && value <= measured.most)) {
       throw InputError("noise", "'" + text + "' has no sensible number",
                        fmt::format("give {}=NUMBER of {} to {}", name, measured.least, measured.most));
     }
@@ -110,6 +156,9 @@ std::vector<FaultName> FaultNames() {
   for (const WorldNoise& world : kWorldNoises) names.push_back({world.name, world.meaning});
   for (const MeasuredNoise& measured : kMeasuredNoises) {
     names.push_back({std::string(measured.name) + "=NUMBER", measured.meaning});
+  }
+  for (const DrawnNoise& drawn : kDrawnNoises) {
+    names.push_back({std::string(drawn.name) + "=FROM..TO", "the same, drawn per episode"});
   }
   return names;
 }
@@ -155,7 +204,7 @@ EpisodeFaults ParseFaults(std::string_view text) {
     noise.robot = env::NoisePreset(name);
   }
   for (const std::string& name : measured) {
-    if (!AddMeasured(name, noise)) throw UnknownNoise(name);
+    if (!AddDrawn(name, noise) && !AddMeasured(name, noise)) throw UnknownNoise(name);
   }
   if (noise.outside && noise.fall_in) {
     throw InputError("noise", "'outside' and 'fall-in' both say where the target stands", "give one of them");

@@ -12,12 +12,17 @@ namespace feeler::workflow {
 struct EpisodeFaults {
   std::string name = "ideal";  ///< as records give it
   env::NoiseOptions robot;     ///< arm and force sensor
-  /// The truth lies outside the hypotheses: 0.5 to 4 mm beyond the box of possible positions on one axis.
+  /// The truth lies outside the hypotheses: beyond the box of possible positions on one axis.
   bool outside = false;
+  double outside_least_m = 0.0005;  ///< drawn uniformly from here
+  double outside_most_m = 0.004;    ///< to here
   /// The truth lies so that a probe of the policy comes down into the opening.
   bool fall_in = false;
-  double oversize_m = 0.0;     ///< the sides of the target stand this much farther out in physics than in the model
-  double yaw_error_rad = 0.0;  ///< the target is turned by this about the insertion axis, the sign drawn
+  double oversize_m = 0.0;  ///< the sides of the target stand this much farther out in physics than in the model
+  /// The target is turned by so much about the insertion axis, the sign drawn; where `least` is smaller, so is the turn
+  /// (uniform between the two).
+  double yaw_error_rad = 0.0;
+  double yaw_error_least_rad = 0.0;
 };
 
 struct FaultName {
@@ -27,9 +32,9 @@ struct FaultName {
 /// Every name that ParseFaults takes, with a line about each.
 std::vector<FaultName> FaultNames();
 
-/// One name or several with commas between ("friction,yaw-2", "force-noise=2,yaw=1.5"): at most one of the arm, the
-/// rest add up. Throws InputError for an unknown name, listing the known ones, and for names that contradict each
-/// other.
+/// One name or several with commas between ("friction,yaw-2", "force-noise=2,yaw=1.5", "yaw=0..5,outside=0.3..7"): at
+/// most one of the arm, the rest add up. A..B is drawn per episode from its seed. Throws InputError for an unknown
+/// name, listing the known ones, and for names that contradict each other.
 EpisodeFaults ParseFaults(std::string_view text);
 
 }  // namespace feeler::workflow

@@ -1,6 +1,7 @@
 // Laws of the insertion. The chamfer of 1 mm catches an error of 1 mm in x and y, with and without joint friction,
 // and one of 2 mm in both fails; the verdict follows from the true poses alone: it is the same when the whole scene is
-// moved, and each limit on its own turns it.
+// moved, and each limit on its own turns it. Walls of the opening that hold the tool decide across the insertion,
+// whatever the tolerance says; beside the opening nothing is inserted, however deep.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +22,7 @@ InsertionVerdict Insert(SimulatedRobot& robot, const Eigen::Vector2d& error_m, c
   motion.world_T_tool = {above};
   motion.world_T_tool.front().translation().z() -= 0.005 + 0.019;
   robot.Compliant(motion);
-  return JudgeInsertion(scene.task, LimitsOf(scene.task), robot.world().ToolPose(), robot.world().TargetPose(),
+  return JudgeInsertion(scene.task, LimitsOf(scene), robot.world().ToolPose(), robot.world().TargetPose(),
                         robot.statistics().peak_force_n, robot.Time());
 }
 
@@ -72,6 +73,33 @@ TEST(InsertionJudge, EachLimitTurnsTheVerdict) {
   EXPECT_EQ(judge({0, 0, -0.018}, 0, 251), InsertionReason::kTooMuchForce);
   EXPECT_EQ(judge({0, 0, -0.018}, 0, 60, 121), InsertionReason::kTooLate);
   EXPECT_EQ(judge({std::nan(""), 0, -0.018}), InsertionReason::kOffToTheSide);
+}
+
+TEST(InsertionJudge, WallsOfTheOpeningDecide) {
+  const Scene& scene = *PlugScene();
+  const double clearance_m = 0.0005;  // of the shipped socket, to each side
+  for (const double tolerance_m : {1e-5, 0.001, 0.01}) {
+    Task task = scene.task;
+    task.tolerance.lateral_m = tolerance_m;
+    Scene other = scene;
+    other.task = task;
+    const InsertionLimits limits = LimitsOf(other);
+    for (const int axis : {0, 1}) {
+      for (const double wall_m : limits.walls_m[static_cast<std::size_t>(axis)]) {
+        EXPECT_GT(wall_m, clearance_m);
+        EXPECT_LT(wall_m, clearance_m + 0.0002);
+      }
+    }
+    const auto judge = [&](double x_m, double y_m) {
+      const Pose tool = scene.task.world_T_target * MakePose({x_m, y_m, -scene.task.insertion_depth_m});
+      return JudgeInsertion(task, limits, tool, scene.task.world_T_target, 0, 0).reason;
+    };
+    EXPECT_EQ(judge(clearance_m, -clearance_m), InsertionReason::kInserted) << tolerance_m;
+    EXPECT_EQ(judge(0.0009, 0.0), InsertionReason::kOffToTheSide) << "in the wall";
+    EXPECT_EQ(judge(0.0, -0.0009), InsertionReason::kOffToTheSide) << "in the wall";
+    EXPECT_EQ(judge(0.045, 0.0), InsertionReason::kOffToTheSide) << "beside the housing";
+    EXPECT_EQ(judge(0.0, 0.04), InsertionReason::kOffToTheSide) << "beside the housing";
+  }
 }
 
 TEST(InsertionJudge, DoesNotDependOnWhereTheSceneStands) {

@@ -89,6 +89,38 @@ TEST(DrawEpisode, YawErrorHasItsSizeAndEitherSign) {
   EXPECT_LT(positive, 140);
 }
 
+TEST(DrawEpisode, RangesAreFilledAndKept) {
+  const Task task = ThreeAxisTask();
+  const planner::ProblemFamily family = planner::ParseProblemFamily("3x3x3");
+  const EpisodeFaults faults = ParseFaults("yaw=1..5,outside=2..7");
+  const double degree = std::numbers::pi / 180.0;
+  int small_turns = 0;
+  int near_places = 0;
+  for (std::uint64_t k = 0; k < 200; ++k) {
+    const EpisodeDraw draw = DrawEpisode(task, family, 3, k, faults);
+    const Pose offset = draw.world_T_estimate.inverse() * draw.world_T_true;
+    const double turn_rad = std::abs(std::atan2(offset.linear()(1, 0), offset.linear()(0, 0)));
+    EXPECT_GE(turn_rad, 1.0 * degree - 1e-12);
+    EXPECT_LE(turn_rad, 5.0 * degree + 1e-12);
+    small_turns += turn_rad < 3.0 * degree;
+    double beyond_m = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      beyond_m = std::max(beyond_m, std::abs(offset.translation()[axis]) - 1.5 * task.cell_m);
+    }
+    EXPECT_GE(beyond_m, 0.002 - 1e-12);
+    EXPECT_LE(beyond_m, 0.007 + 1e-12);
+    near_places += beyond_m < 0.0045;
+  }
+  EXPECT_GT(small_turns, 60);
+  EXPECT_LT(small_turns, 140);
+  EXPECT_GT(near_places, 60);
+  EXPECT_LT(near_places, 140);
+  for (const char* bad : {"yaw=5..1", "yaw=0..x", "yaw=..3", "outside=-1..3", "stiffness=1..2", "yaw=0..99",
+                          "tilt=1..2", "outside,outside=1..2", "yaw-1,yaw=1..2"}) {
+    EXPECT_THROW((void)ParseFaults(bad), InputError) << bad;
+  }
+}
+
 std::shared_ptr<const PlanningSetup> PlugSetup() {
   static const auto kSetup = std::make_shared<const PlanningSetup>(LoadPlanningSetup("plug"));
   return kSetup;
