@@ -31,7 +31,8 @@ nlohmann::json ProblemJson(const policies::StoredProblem& problem, const std::ve
           {"hypotheses", problem.extents.Count()},
           {"status", problem.status},
           {"solver", problem.solver},
-          {"epsilon", problem.epsilon},
+          {"epsilon", problem.Promise()},  // for scripts of old: the gap of the certified solver too
+          {"gap", problem.certified() ? nlohmann::json(problem.gap) : nlohmann::json()},
           {"expected_cost", problem.expected_cost},
           {"lower_bound", problem.lower_bound},
           {"ratio", problem.Ratio()},

@@ -15,7 +15,7 @@ struct SolverFlags {
   std::string solver = "certified";
   std::string setting = "fast";
   std::string heuristic;  ///< empty: the setting's
-  double epsilon = 2.0;
+  double epsilon = planner::SolverOptions{}.epsilon;
   double gap = 1.2;
   double time_limit_s = 0.0;  ///< 0: not given
   std::int64_t expansion_limit = 0;

@@ -27,12 +27,11 @@ namespace feeler {
 /// Rethrows the first exception; `work` itself makes the others stop.
 void RunOnThreads(int threads, const std::function<void()>& work);
 
-namespace worker_pool_internal {
-
-/// Every thread makes one worker with make_worker() and calls worker(index) until no index is left.
+/// Works the indices 0..count-1 on at most jobs.threads() threads: each makes one worker with make_worker() and calls
+/// worker(index) until no index is left.
 template <class MakeWorker>
-void RunIndices(std::size_t count, Parallelism jobs, const CancellationToken* cancellation,
-                const MakeWorker& make_worker) {
+void RunWorkers(std::size_t count, Parallelism jobs, const MakeWorker& make_worker,
+                const CancellationToken* cancellation = nullptr) {
   if (count == 0) return;
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
@@ -51,6 +50,8 @@ void RunIndices(std::size_t count, Parallelism jobs, const CancellationToken* ca
     }
   });
 }
+
+namespace worker_pool_internal {
 
 /// Results that came before their turn, and what receives them.
 template <class Result, class HandOver>
@@ -90,9 +91,12 @@ std::size_t RunInOrder(std::size_t count, Parallelism jobs, const MakeWorker& ma
   using Worker = std::invoke_result_t<const MakeWorker&>;
   using Result = std::invoke_result_t<Worker&, std::size_t>;
   worker_pool_internal::InOrder<Result, HandOver> results(hand_over);
-  worker_pool_internal::RunIndices(count, jobs, cancellation, [&] {
-    return [worker = make_worker(), &results](std::size_t index) mutable { results.Put(index, worker(index)); };
-  });
+  RunWorkers(
+      count, jobs,
+      [&] {
+        return [worker = make_worker(), &results](std::size_t index) mutable { results.Put(index, worker(index)); };
+      },
+      cancellation);
   return results.handed_over();
 }
 
@@ -103,14 +107,17 @@ bool ParallelFor(std::size_t count, Parallelism jobs, const Visit& visit, const 
                  const CancellationToken* cancellation = nullptr) {
   std::mutex mutex;  // guards done
   std::size_t done = 0;
-  worker_pool_internal::RunIndices(count, jobs, cancellation, [&] {
-    return [&](std::size_t index) {
-      visit(index);
-      const std::lock_guard lock(mutex);
-      ++done;
-      if (progress) progress(static_cast<std::int64_t>(done), static_cast<std::int64_t>(count));
-    };
-  });
+  RunWorkers(
+      count, jobs,
+      [&] {
+        return [&](std::size_t index) {
+          visit(index);
+          const std::lock_guard lock(mutex);
+          ++done;
+          if (progress) progress(static_cast<std::int64_t>(done), static_cast<std::int64_t>(count));
+        };
+      },
+      cancellation);
   return done == count;
 }
 

@@ -1,241 +1,126 @@
 #include "feeler/planner/solve.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "feeler/core/error.h"
-#include "feeler/planner/belief/belief_graph.h"
 #include "feeler/planner/bounds/leaving/leaving_bound.h"
-#include "feeler/planner/bounds/planning_tables.h"
 #include "feeler/planner/policy/fit_workspace.h"
-#include "feeler/planner/policy/freeze_policy.h"
 #include "feeler/planner/policy/indistinguishable.h"
-#include "feeler/planner/search/bounded_search.h"
-#include "feeler/planner/search/experience.h"
-#include "feeler/planner/search/fewest_moves.h"
-#include "feeler/planner/search/greedy_completion.h"
-#include "feeler/planner/search/open_policy.h"
-#include "feeler/planner/search/random_judgement.h"
-#include "feeler/planner/search/rtdp_bel.h"
-#include "feeler/planner/search/stop_watch.h"
+#include "feeler/planner/solve_run.h"
 
 namespace feeler::planner {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Up to so many hypotheses the greedy policy is tried beside the one for openings.
-constexpr std::uint32_t kGreedyBesideOpen = 256;
-/// Where hypotheses have orientations, which makes the heuristic loose: at most so many further greedy policies, and
-/// the inflation of the heuristic in the guess of BoundedSearch.
-constexpr std::uint64_t kFurtherPolicies = 120;
-constexpr double kGuessInflation = 1.3;
+/// Stops between two looks at how much memory the shared tables take.
+constexpr int kTableBytesEvery = 256;
 
-/// epsilon * heur, times the weight of the belief.
-struct InflatedHeuristic {
-  const BeliefGraph* graph = nullptr;
-  double epsilon = 1.0;
-  double operator()(BeliefId b) const { return epsilon * graph->Heuristic(b); }
-};
-
-/// One attempt at a problem: the belief graph, the clocks, and what every solver does with them.
-class SolveRun {
- public:
-  SolveRun(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
-           const Experience& experience, bool canonical)
-      : options_(options),
-        experience_(experience),
-        tables_(tables),
-        watch_(options),
-        graph_(problem, tables.masks(), canonical) {
-    heuristic_ = tables.MakeHeuristic(problem, graph_.sets());
-    if (options.solver == SolverKind::kCertified && options.heuristic == HeuristicKind::kCertificate &&
-        LeavingBound::Fits(problem)) {
-      heuristic_ = std::make_unique<WithLeavingBound>(problem, graph_.sets(), std::move(heuristic_));
-    }
-    graph_.SetHeuristic(heuristic_.get());
-    result_.expected_cost = kInfinity;
+void RunSolver(SolveRun& run) {
+  switch (run.options.solver) {
+    case SolverKind::kCertified: return SolveCertified(run);
+    case SolverKind::kRtdpBel: return SolveRtdpBel(run);
+    case SolverKind::kERtdpBel: return SolveERtdpBel(run);
   }
+}
 
-  SolverResult Run() {
-    start_ = graph_.Start();
-    if (start_ == kNoBelief) {
-      result_.policy = FreezePolicy(graph_, [](BeliefId) { return GuardedMove(); });
-    } else {
-      weight_ = graph_.Weight(start_);
-      switch (options_.solver) {
-        case SolverKind::kCertified: RunCertified(); break;
-        case SolverKind::kRtdpBel: RunRtdpBel(Inflated(options_.epsilon)); break;
-        case SolverKind::kERtdpBel: RunERtdpBel(); break;
-      }
-    }
-    Finish();
-    return std::move(result_);
+/// One attempt, from the start belief to the result; the accounts in it are those of all attempts so far.
+SolverResult Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+                     const Experience& experience, StopWatch& watch, bool canonical) {
+  SolveRun run(problem, options, tables, experience, watch, canonical);
+  SolverResult& result = run.result;
+  if (run.start == kNoBelief) {
+    result.policy = FreezePolicy(run.graph, [](BeliefId) { return GuardedMove(); });
+  } else {
+    RunSolver(run);
   }
-
- private:
-  InflatedHeuristic Inflated(double epsilon) const { return {&graph_, epsilon}; }
-
-  std::optional<SolverStatus> Stop(std::int64_t expansions) {
-    if (graph_.bytes() + heuristic_->bytes() > options_.memory_limit_bytes) return SolverStatus::kExpansionLimit;
-    return watch_.Stop(expansions);
+  if (result.policy) {
+    result.expected_cost = result.policy->expected_cost;
+    result.lower_bound = std::min(result.lower_bound, result.expected_cost);  // rounding
+    result.policy->lower_bound = result.lower_bound;
   }
+  if (options.on_bounds) run.Row(result.trials, result.expansions, result.lower_bound, result.expected_cost);
+  watch.EndAttempt(result.expansions);
+  return std::move(result);
+}
 
-  /// RTDP-Bel with heur^E in place of epsilon * heur.
-  void RunERtdpBel() {
-    if (experience_.kind == ExperienceKind::kNone || experience_.policy == nullptr) {
-      return RunRtdpBel(Inflated(options_.epsilon));
-    }
-    ExperienceMdp mdp = experience_.kind == ExperienceKind::kRollout
-                            ? RollOut(graph_, *experience_.policy)
-                            : Transplant(graph_, *experience_.problem, *experience_.policy);
-    ExperienceHeuristic heuristic(graph_, std::move(mdp), options_.epsilon, options_.jumps);
-    RunRtdpBel([&](BeliefId b) { return graph_.Weight(b) * heuristic(b); });
-  }
+/// What is known without a policy when nothing could be tried, or need not be.
+SolverResult WithoutPolicy(SolverStatus status) {
+  SolverResult result;
+  result.status = status;
+  result.expected_cost = kInfinity;
+  return result;
+}
 
-  template <class Initial>
-  void RunRtdpBel(Initial initial) {
-    RtdpBel search(graph_, initial, options_.seed);
-    const auto lower = [&] {
-      return std::max(search.Lower(start_), search.Value(start_) / options_.epsilon) / weight_;
-    };
-    const auto why = search.Run(start_, [&](std::int64_t expansions) {
-      if (watch_.RowDue()) Row(search.trials(), expansions, lower(), kInfinity);
-      return Stop(expansions);
-    });
-    result_.lower_bound = lower();
-    result_.trials = search.trials();
-    result_.expansions = search.expansions();
-    if (why) {
-      result_.status = *why;
-    } else {
-      result_.policy = Freeze(search);
+bool Cancelled(const SolverOptions& options) {
+  return options.cancellation != nullptr && options.cancellation->cancelled();
+}
+
+/// Attempts until one has a policy that stays in the workspace, or a limit holds.
+SolverResult SolveInWorkspace(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+                              const Experience& experience, StopWatch& watch) {
+  if (!problem.generous_workspace) {
+    auto pairs = IndistinguishablePairs(problem, tables.masks());
+    if (!pairs.empty()) {
+      SolverResult result = WithoutPolicy(SolverStatus::kUnlocalizable);
+      result.lower_bound = kInfinity;
+      result.indistinguishable = std::move(pairs);
+      return result;
     }
   }
-
-  /// A first policy, then BoundedSearch until the gap is closed. A complete policy comes first: it is not interrupted
-  /// by limits.
-  void RunCertified() {
-    result_.lower_bound = graph_.Heuristic(start_) / weight_;
-    if (graph_.problem().generous_workspace && tables_.filled().bound) {
-      const double bound = tables_.filled().bound->Weighted(graph_.sets(), graph_.set(start_), graph_.robot(start_));
-      result_.lower_bound = std::max(result_.lower_bound, bound / weight_);
-    }
-    GreedyCompletion greedy(graph_, Estimate());
-    if (const std::optional<Problem> filled = WithoutDeadEnds()) {
-      // Dead ends make beliefs many and the greedy choice short-sighted (it looks into them one by one).
-      BeliefGraph filled_graph(*filled, tables_.filled().tables->masks(), graph_.canonical());
-      const auto heuristic = tables_.filled().tables->MakeHeuristic(*filled, filled_graph.sets());
-      filled_graph.SetHeuristic(heuristic.get());
-      OpenPolicy open(graph_, filled_graph, *tables_.filled().bound, greedy);
-      open.Run(start_);
-      if (graph_.sets().info(graph_.set(start_)).size <= kGreedyBesideOpen || !open.Solved(start_)) Complete(greedy);
-      if (open.Solved(start_)) CloseGap(open, 0);
-    } else if (Complete(greedy)) {
-      if (Oriented()) Improve(greedy);
-      CloseGap(greedy, 0);
-    }
+  const bool canonical =
+      options.canonical_translation && problem.generous_workspace && options.solver != SolverKind::kERtdpBel;
+  SolverResult first = Attempt(problem, options, tables, experience, watch, canonical);
+  if (!canonical || !first.policy || StaysInWorkspace(problem, *first.policy)) return first;
+  // Further actions may cost something: what was promised must still hold.
+  const double factor = options.solver == SolverKind::kCertified ? options.gap : options.epsilon;
+  std::optional<PolicyGraph> fitted = FitIntoWorkspace(problem, *first.policy);
+  const bool kept = fitted && (fitted->expected_cost <= first.expected_cost * (1.0 + 1e-12) ||
+                               fitted->expected_cost <= factor * first.lower_bound);
+  SolverResult result = first;
+  if (!kept) {
+    result = Attempt(problem, options, tables, experience, watch, false);
+    // A limit came before the second policy, or before it was as good.
+    const bool worse = fitted && (!result.policy || fitted->expected_cost < result.expected_cost);
+    if (!worse) return result;
+    result.lower_bound = std::max(result.lower_bound, first.lower_bound);
   }
-
-  std::function<double(BeliefId)> Estimate() {
-    if (options_.heuristic != HeuristicKind::kCuboids) return {};
-    return [this](BeliefId b) { return heuristic_->Estimate(graph_.set(b), graph_.robot(b)); };
-  }
-
-  /// False, and says so in the result, if some hypotheses cannot be told apart.
-  bool Complete(GreedyCompletion<BeliefGraph>& greedy) {
-    if (!greedy.Run(start_, [](std::int64_t) { return std::optional<SolverStatus>(); })) return true;
-    result_.status = SolverStatus::kUnlocalizable;
-    result_.expansions = greedy.expansions();
-    result_.lower_bound = kInfinity;
-    result_.indistinguishable = IndistinguishablePairs(graph_.problem(), tables_.masks());
-    return false;
-  }
-
-  bool Oriented() const { return graph_.problem().map->orientations() > 1; }
-
-  /// Further policies while the gap is open, with up to half of the budget: with orientations the first may be far off.
-  void Improve(GreedyCompletion<BeliefGraph>& greedy) {
-    const auto stop = [this](std::int64_t expansions) -> std::optional<SolverStatus> {
-      if (expansions >= options_.expansion_limit / 2) return SolverStatus::kExpansionLimit;
-      return Stop(expansions);
-    };
-    for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
-      if (greedy.Value(start_) <= options_.gap * result_.lower_bound * weight_) return;
-      if (greedy.Run(start_, stop, RandomJudgement(graph_, options_.seed, number))) return;
-    }
-  }
-
-  /// The problem on the map whose dead ends are filled; none where there are none, or the tool is in one.
-  std::optional<Problem> WithoutDeadEnds() {
-    const Problem& problem = graph_.problem();
-    if (!problem.generous_workspace || !tables_.filled().bound) return std::nullopt;
-    Problem without = problem;
-    without.map = tables_.filled().map;
-    for (const Hypothesis& h : problem.hypotheses) {
-      if (Blocked(without, problem.start, h)) return std::nullopt;
-    }
-    return without;
-  }
-
-  template <class Incumbent>
-  void CloseGap(Incumbent& incumbent, std::int64_t expansions_before) {
-    BoundedSearch search(graph_, incumbent, options_.gap, Oriented() ? kGuessInflation : 1.0);
-    const auto lower = [&] { return std::max(result_.lower_bound, search.Lower(start_) / weight_); };
-    const auto why = search.Run(start_, [&](std::int64_t searched) -> std::optional<SolverStatus> {
-      const double upper = search.Upper(start_) / weight_;
-      if (watch_.RowDue()) Row(result_.trials + search.trials(), searched + expansions_before, lower(), upper);
-      if (upper <= options_.gap * lower()) return SolverStatus::kGap;
-      return Stop(searched + expansions_before);
-    });
-    result_.lower_bound = lower();
-    result_.trials += search.trials();
-    result_.expansions = search.expansions() + expansions_before;
-    result_.status = why.value_or(SolverStatus::kGap);
-    result_.policy = Freeze(search);
-    if (result_.policy->expected_cost <= result_.lower_bound * (1.0 + 1e-9) + 1e-9) {
-      result_.status = SolverStatus::kConverged;
-    }
-  }
-
-  /// The policy that a search found, with as few moves as its cost allows.
-  template <class Search>
-  PolicyGraph Freeze(Search& search) {
-    const MoveMap moves = FewestMoves(graph_, [&](BeliefId b) {
-      const BeliefAction& action = graph_.Actions(b)[static_cast<std::size_t>(search.Action(b))];
-      return GuardedMove{action.direction, action.cells};
-    });
-    return FreezePolicy(graph_, [&](BeliefId b) { return moves.at(b); });
-  }
-
-  void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) {
-    options_.on_bounds({watch_.wall_s(), trials, expansions, lower, upper});
-  }
-
-  void Finish() {
-    if (result_.policy) {
-      result_.expected_cost = result_.policy->expected_cost;
-      result_.lower_bound = std::min(result_.lower_bound, result_.expected_cost);  // rounding
-      result_.policy->lower_bound = result_.lower_bound;
-    }
-    if (options_.on_bounds) Row(result_.trials, result_.expansions, result_.lower_bound, result_.expected_cost);
-    result_.wall_s = watch_.wall_s();
-    result_.cpu_s = watch_.cpu_s();
-  }
-
-  const SolverOptions& options_;
-  const Experience& experience_;
-  const PlanningTables& tables_;
-  StopWatch watch_;
-  BeliefGraph graph_;
-  std::unique_ptr<BeliefHeuristic> heuristic_;
-  BeliefId start_ = kNoBelief;
-  double weight_ = 1.0;
-  SolverResult result_;
-};
+  result.expected_cost = fitted->expected_cost;
+  result.policy = std::move(fitted);
+  result.lower_bound = std::min(result.lower_bound, result.expected_cost);
+  return result;
+}
 
 }  // namespace
+
+SolveRun::SolveRun(const Problem& problem, const SolverOptions& solver_options, const PlanningTables& planning_tables,
+                   const Experience& given_experience, StopWatch& stop_watch, bool canonical)
+    : options(solver_options),
+      tables(planning_tables),
+      experience(given_experience),
+      watch(stop_watch),
+      graph(problem, tables.masks(), canonical),
+      heuristic(tables.MakeHeuristic(problem, graph.sets())) {
+  if (options.solver == SolverKind::kCertified && options.heuristic == HeuristicKind::kCertificate &&
+      LeavingBound::Fits(problem)) {
+    heuristic = std::make_unique<WithLeavingBound>(problem, graph.sets(), std::move(heuristic));
+  }
+  graph.SetHeuristic(heuristic.get());
+  result.expected_cost = kInfinity;
+  start = graph.Start();
+  if (start != kNoBelief) weight = graph.Weight(start);
+}
+
+std::optional<SolverStatus> SolveRun::Stop(std::int64_t expansions) {
+  if (stops_++ % kTableBytesEvery == 0) table_bytes_ = tables.bytes();
+  if (table_bytes_ + graph.bytes() + heuristic->bytes() > options.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+  return watch.Stop(expansions);
+}
+
+void SolveRun::Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) const {
+  options.on_bounds({watch.wall_s(), trials, watch.expansions_before() + expansions, lower, upper});
+}
 
 std::string_view ToString(SolverStatus status) {
   switch (status) {
@@ -272,32 +157,14 @@ SolverResult Solve(const Problem& problem, const SolverOptions& options, std::sh
   if (experience.kind == ExperienceKind::kNaive && experience.policy != nullptr && experience.problem == nullptr) {
     throw InputError("experience", "a naive experience needs the problem its policy was made for");
   }
+  StopWatch watch(options);
   if (!tables) tables = BuildPlanningTables(problem, options);
-  const bool canonical =
-      options.canonical_translation && problem.generous_workspace && options.solver != SolverKind::kERtdpBel;
-  if (!problem.generous_workspace) {
-    SolverResult result;
-    result.indistinguishable = IndistinguishablePairs(problem, tables->masks());
-    if (!result.indistinguishable.empty()) {
-      result.status = SolverStatus::kUnlocalizable;
-      result.expected_cost = kInfinity;
-      result.lower_bound = kInfinity;
-      return result;
-    }
-  }
-  SolverResult result = SolveRun(problem, options, *tables, experience, canonical).Run();
-  if (canonical && result.policy && !StaysInWorkspace(problem, *result.policy)) {
-    // Further actions may cost something: what was promised must still hold.
-    const double factor = options.solver == SolverKind::kCertified ? options.gap : options.epsilon;
-    std::optional<PolicyGraph> fitted = FitIntoWorkspace(problem, *result.policy);
-    if (fitted && (fitted->expected_cost <= result.expected_cost * (1.0 + 1e-12) ||
-                   fitted->expected_cost <= factor * result.lower_bound)) {
-      result.expected_cost = fitted->expected_cost;
-      result.policy = std::move(fitted);
-      return result;
-    }
-    result = SolveRun(problem, options, *tables, experience, false).Run();
-  }
+  // Tables are incomplete where a cancellation came while they were built.
+  SolverResult result = Cancelled(options) ? WithoutPolicy(SolverStatus::kCancelled)
+                                           : SolveInWorkspace(problem, options, *tables, experience, watch);
+  result.expansions = watch.expansions_before();
+  result.wall_s = watch.wall_s();
+  result.cpu_s = watch.cpu_s();
   return result;
 }
 

@@ -33,15 +33,16 @@ void OnlinePolicy::Plan(const Belief& belief) {
   here.hypotheses = belief.hypotheses;
   planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   options.gap = options_.gap;
+  options.first_policy_in_any_case = true;  // the robot stands waiting
   if (options_.expansion_limit) {
     options.expansion_limit = *options_.expansion_limit;
   } else {
     options.time_limit_s = options_.time_limit_s;
   }
-  const planner::SolverResult result = planner::Solve(here, options, tables_->TablesFor(*problem_, options));
+  planner::SolverResult result = planner::Solve(here, options, tables_->TablesFor(*problem_, options));
   if (!result.policy) return;
   if (plan_ && plan_->node().expected_cost <= result.expected_cost) return;
-  plan_.emplace(std::make_shared<const planner::PolicyGraph>(*result.policy));
+  plan_.emplace(std::make_shared<const planner::PolicyGraph>(*std::move(result.policy)));
   plan_->Begin(here);
   certified_ = result.status == planner::SolverStatus::kGap || result.status == planner::SolverStatus::kConverged;
 }

@@ -3,14 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
-#include <exception>
 #include <mutex>
-#include <thread>
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/lattice_grid.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/env/contact/lattice_phase.h"
 #include "feeler/env/contact/line_sweep.h"
 
@@ -63,30 +63,17 @@ template <class Visit>
 void SweepLines(const ObstacleSet& set, const Lines& lines, const Eigen::Vector3d& phase, double cell_m, bool judged,
                 Parallelism parallelism, Progress& progress, const Visit& visit) {
   constexpr int kChunk = 64;
-  std::atomic<int> next{0};
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto work = [&] {
-    try {
-      LineSweep sweep(set, kAccuracy_cells * cell_m);
-      for (int begin = next.fetch_add(kChunk); begin < lines.count(); begin = next.fetch_add(kChunk)) {
-        const int end = std::min(begin + kChunk, lines.count());
-        for (int line = begin; line < end; ++line) {
-          visit(line, sweep.Sweep(lines.axis, (lines.Begin(line).cast<double>() + phase) * cell_m, judged));
-        }
-        progress.Add(end - begin);
+  const auto chunks = static_cast<std::size_t>((lines.count() + kChunk - 1) / kChunk);
+  RunWorkers(chunks, parallelism, [&] {
+    return [&, sweep = LineSweep(set, kAccuracy_cells * cell_m)](std::size_t chunk) mutable {
+      const int begin = static_cast<int>(chunk) * kChunk;
+      const int end = std::min(begin + kChunk, lines.count());
+      for (int line = begin; line < end; ++line) {
+        visit(line, sweep.Sweep(lines.axis, (lines.Begin(line).cast<double>() + phase) * cell_m, judged));
       }
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      if (!failure) failure = std::current_exception();
-      next = lines.count();
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < parallelism.threads(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+      progress.Add(end - begin);
+    };
+  });
 }
 
 /// Travel along both directions of one lattice line from the stretches that are blocked on it.
@@ -94,8 +81,7 @@ class LineFiller {
  public:
   LineFiller(const CellBox& domain, const Eigen::Vector3d& phase, double cell_m, ContactMap::Layer& layer)
       : domain_(domain), phase_(phase), cell_m_(cell_m), layer_(layer) {
-    const Cell size = domain.Size();
-    stride_ = {1, size.x(), std::int64_t{size.x()} * size.y()};
+    stride_ = GridStrides(domain.Size());
   }
 
   void Fill(int axis, const Cell& begin, const std::vector<BlockedStretch>& stretches) {
@@ -103,8 +89,9 @@ class LineFiller {
     auto& minus = layer_.travel[IndexOf(MakeDirection(axis, -1))];
     std::size_t stretch = 0;
     const Cell offset = begin - domain_.min;
-    auto index = static_cast<std::size_t>(offset.x() * stride_[0] + offset.y() * stride_[1] + offset.z() * stride_[2]);
-    for (int k = 0; k < domain_.Size()[axis]; ++k, index += static_cast<std::size_t>(stride_[axis])) {
+    auto index = GridIndex(domain_.Size(), offset);
+    for (int k = 0; k < domain_.Size()[axis];
+         ++k, index += static_cast<std::size_t>(stride_[static_cast<std::size_t>(axis)])) {
       const double t = (domain_.min[axis] + k + phase_[axis]) * cell_m_;
       while (stretch < stretches.size() && stretches[stretch].high_m <= t) ++stretch;
       const bool ahead = stretch < stretches.size();
@@ -126,7 +113,7 @@ class LineFiller {
   Eigen::Vector3d phase_;
   double cell_m_;
   ContactMap::Layer& layer_;
-  Eigen::Matrix<std::int64_t, 3, 1> stride_;
+  std::array<std::int64_t, 3> stride_{};
 };
 
 /// Ends of blocked stretches within the domain, per lattice line, in cells.

@@ -1,14 +1,11 @@
 #include "feeler/env/contact/contact_map_check.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "feeler/core/random.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/env/model/overlap_judge.h"
 
 namespace feeler::env {
@@ -67,36 +64,26 @@ class Checker {
 ContactMapCheck CheckContactMap(const TaskModel& task_model, Opening opening, const planner::ContactMap& map,
                                 std::int64_t probes, std::uint64_t seed, double grazing_m, Parallelism parallelism) {
   const std::int64_t blocks = (probes + kBlock - 1) / kBlock;
-  std::atomic<std::int64_t> next{0};
   ContactMapCheck sum;
-  std::exception_ptr failure;
-  std::mutex mutex;
-  const auto work = [&] {
-    try {
-      Checker checker(task_model, opening, map, grazing_m);
-      ContactMapCheck check;
-      for (std::int64_t block = next++; block < blocks; block = next++) {
-        RandomStream random(seed, static_cast<std::uint64_t>(block), "contact-map probes");
-        for (std::int64_t i = block * kBlock; i < std::min(probes, (block + 1) * kBlock); ++i) {
-          checker.Probe(random, check);
-        }
-      }
-      const std::lock_guard lock(mutex);
-      sum.probes += check.probes;
-      sum.blocked += check.blocked;
-      sum.grazing += check.grazing;
-      sum.disagreements += check.disagreements;
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
-      next = blocks;
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < parallelism.threads(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  RunInOrder(
+      static_cast<std::size_t>(blocks), parallelism,
+      [&] {
+        return [&, checker = Checker(task_model, opening, map, grazing_m)](std::size_t index) mutable {
+          const auto block = static_cast<std::int64_t>(index);
+          RandomStream random(seed, index, "contact-map probes");
+          ContactMapCheck check;
+          for (std::int64_t i = block * kBlock; i < std::min(probes, (block + 1) * kBlock); ++i) {
+            checker.Probe(random, check);
+          }
+          return check;
+        };
+      },
+      [&](std::size_t, const ContactMapCheck& check) {
+        sum.probes += check.probes;
+        sum.blocked += check.blocked;
+        sum.grazing += check.grazing;
+        sum.disagreements += check.disagreements;
+      });
   return sum;
 }
 

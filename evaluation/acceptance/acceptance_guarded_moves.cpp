@@ -4,17 +4,15 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "feeler/core/error.h"
 #include "feeler/core/random.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/env/contact/line_sweep.h"
 #include "feeler/env/robot/simulated_robot.h"
 #include "feeler/env/robot/tool_kinematics.h"
@@ -148,6 +146,24 @@ Figures FiguresOf(const std::vector<json>& moves) {
   return figures;
 }
 
+/// The moves of a block under a noise: the same under each. Fewer where it was cancelled.
+json MeasureBlock(TrialMaker& maker, env::SimulatedRobot& robot, const char* noise_name,
+                  const ExperimentRequest& request, std::int64_t block) {
+  const env::NoiseOptions noise = env::NoisePreset(noise_name);
+  json moves = json::array();
+  RandomStream random(request.seed, static_cast<std::uint64_t>(block), "guarded moves");
+  while (static_cast<std::int64_t>(moves.size()) < kBlock) {
+    if (request.cancellation != nullptr && request.cancellation->cancelled()) break;
+    const std::optional<Trial> trial = maker.Draw(random);
+    if (!trial) continue;
+    json move = Measure(*trial, robot, noise,
+                        RandomStream(request.seed, static_cast<std::uint64_t>(block * kBlock) + moves.size(),
+                                     "sensor of guarded moves"));
+    if (!move.is_null()) moves.push_back(std::move(move));
+  }
+  return moves;
+}
+
 }  // namespace
 
 ExperimentResult RunAcceptanceGuardedMoves(const ExperimentRequest& request) {
@@ -171,49 +187,26 @@ ExperimentResult RunAcceptanceGuardedMoves(const ExperimentRequest& request) {
   };
 
   const auto total = static_cast<std::int64_t>(kNoises.size()) * blocks;
-  std::atomic<std::int64_t> next{0};
-  std::atomic<std::int64_t> done{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
   const auto cancelled = [&] { return request.cancellation != nullptr && request.cancellation->cancelled(); };
-  const auto work = [&] {
-    try {
-      TrialMaker maker(setup, obstacles);
-      env::SimulatedRobot robot(scene);
-      for (std::int64_t i = next++; i < total && !cancelled(); i = next++) {
-        const auto noise_index = static_cast<std::size_t>(i / blocks);
-        const std::int64_t block = i % blocks;
-        const std::string cell = cell_of(noise_index, block);
-        if (cells.Find(cell) == nullptr) {
-          const env::NoiseOptions noise = env::NoisePreset(kNoises[noise_index]);
-          json moves = json::array();
-          // The same moves under every noise.
-          RandomStream random(request.seed, static_cast<std::uint64_t>(block), "guarded moves");
-          while (static_cast<std::int64_t>(moves.size()) < kBlock && !cancelled()) {
-            const std::optional<Trial> trial = maker.Draw(random);
-            if (!trial) continue;
-            json move = Measure(*trial, robot, noise,
-                                RandomStream(request.seed, static_cast<std::uint64_t>(block * kBlock) + moves.size(),
-                                             "sensor of guarded moves"));
-            if (!move.is_null()) moves.push_back(std::move(move));
-          }
-          if (cancelled()) return;
-          cells.Put(cell, std::move(moves));
-        }
-        const std::lock_guard lock(mutex);
-        ++done;
-        if (request.progress) request.progress(done, total);
+  std::mutex mutex;  // guards done
+  std::int64_t done = 0;
+  const auto make_worker = [&] {
+    return [&, maker = TrialMaker(setup, obstacles),
+            robot = std::make_unique<env::SimulatedRobot>(scene)](std::size_t i) mutable {
+      const std::size_t noise = i / static_cast<std::size_t>(blocks);
+      const std::int64_t block = static_cast<std::int64_t>(i) % blocks;
+      const std::string cell = cell_of(noise, block);
+      if (cells.Find(cell) == nullptr) {
+        json moves = MeasureBlock(maker, *robot, kNoises[noise], request, block);
+        if (cancelled()) return;
+        cells.Put(cell, std::move(moves));
       }
-    } catch (...) {
       const std::lock_guard lock(mutex);
-      if (!failure) failure = std::current_exception();
-    }
+      ++done;
+      if (request.progress) request.progress(done, total);
+    };
   };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < request.jobs.threads(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  RunWorkers(static_cast<std::size_t>(total), request.jobs, make_worker, request.cancellation);
   if (cancelled()) return result;
 
   result.complete = true;

@@ -3,16 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <numeric>
-#include <thread>
 
 #include "feeler/core/error.h"
 #include "feeler/core/random.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/evaluation/harness/cell_store.h"
 #include "feeler/evaluation/records/statistics.h"
 #include "feeler/planner/family/problem_family.h"
@@ -143,32 +140,10 @@ std::vector<Cell> CellsOf(const Protocol& protocol) {
 /// Measures the cells that are missing. False: cancelled.
 bool MeasureAll(const World& world, const std::vector<Cell>& cells, const ExperimentRequest& request,
                 CellStore& store) {
-  std::atomic<std::size_t> next{0};
-  std::atomic<std::int64_t> done{0};
-  std::atomic<bool> stop{false};
-  std::mutex mutex;
-  std::exception_ptr error;
-  const auto cancelled = [&] { return request.cancellation != nullptr && request.cancellation->cancelled(); };
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < cells.size() && !stop && !cancelled(); i = next++) {
-        if (store.Find(cells[i].Key()) == nullptr) store.Put(cells[i].Key(), Measure(world, cells[i]));
-        const std::lock_guard lock(mutex);
-        ++done;
-        if (request.progress) request.progress(done, static_cast<std::int64_t>(cells.size()));
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      if (!error) error = std::current_exception();
-      stop = true;
-    }
+  const auto measure = [&](std::size_t i) {
+    if (store.Find(cells[i].Key()) == nullptr) store.Put(cells[i].Key(), Measure(world, cells[i]));
   };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < request.jobs.threads(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (error) std::rethrow_exception(error);
-  return !cancelled();
+  return ParallelFor(cells.size(), request.jobs, measure, request.progress, request.cancellation);
 }
 
 std::vector<double> Values(const json& cell, const char* key) { return cell.at(key).get<std::vector<double>>(); }

@@ -1,13 +1,12 @@
 #include "feeler/evaluation/studies/bounds.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include <atomic>
 #include <cmath>
 #include <mutex>
 
+#include "feeler/core/worker_pool.h"
 #include "feeler/version.h"
 
 namespace feeler::evaluation {
@@ -68,6 +67,7 @@ ExperimentResult RunBoundsOn(const std::vector<std::pair<std::string, PlanningCa
   options.gap = protocol.gap;
   options.time_limit_s = protocol.time_limit_s;
   options.expansion_limit = protocol.expansion_limit;
+  options.first_policy_in_any_case = true;  // the curves begin with it
   options.seed = request.seed;
   ExperimentResult result;
   result.seeds = {request.seed};
@@ -101,15 +101,11 @@ ExperimentResult RunBoundsOn(const std::vector<std::pair<std::string, PlanningCa
     socket_tables =
         planner::BuildPlanningTables(planner::MakeCuboidProblem(planning.task, planning.map, curve.extents), options);
   }
-  std::mutex mutex;
+  std::mutex mutex;  // guards done
   std::atomic<bool> cancelled = false;
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(request.jobs.threads()));
-  tbb::parallel_for(std::size_t{0}, curves.size(), [&](std::size_t i) {
+  const auto measure = [&](std::size_t i) {
     const Curve& curve = curves[i];
-    if (cells.Find(cell_of(curve)) != nullptr) return;
-    if (request.cancellation != nullptr && request.cancellation->cancelled()) cancelled = true;
-    if (cancelled) return;
+    if (cancelled || cells.Find(cell_of(curve)) != nullptr) return;
     json cell = MeasureCurve(sockets[curve.socket].second, curve.extents, options, tables[curve.socket]);
     if (cell.is_null()) {
       cancelled = true;
@@ -119,8 +115,8 @@ ExperimentResult RunBoundsOn(const std::vector<std::pair<std::string, PlanningCa
     const std::lock_guard lock(mutex);
     ++done;
     if (request.progress) request.progress(done, static_cast<std::int64_t>(curves.size()));
-  });
-  if (cancelled) return result;
+  };
+  if (!ParallelFor(curves.size(), request.jobs, measure, {}, request.cancellation) || cancelled) return result;
 
   result.complete = true;
   result.table.columns = {"opening",    "extents", "hypotheses", "time_s", "trials",

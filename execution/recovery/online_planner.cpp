@@ -10,9 +10,11 @@ std::unique_ptr<policies::Policy> OnlinePlanner::PolicyFor(const planner::Proble
   planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   options.gap = 1.5;
   options.expansion_limit = expansion_limit_;
-  const planner::SolverResult result = planner::Solve(problem, options, tables_.TablesFor(problem, options));
+  options.first_policy_in_any_case = true;
+  planner::SolverResult result = planner::Solve(problem, options, tables_.TablesFor(problem, options));
   if (!result.policy) return nullptr;
-  return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::PolicyGraph>(*result.policy));
+  return std::make_unique<policies::DatabasePolicy>(
+      std::make_shared<const planner::PolicyGraph>(*std::move(result.policy)));
 }
 
 }  // namespace feeler::execution

@@ -6,6 +6,8 @@
 #include <cassert>
 #include <map>
 
+#include "feeler/planner/belief/hull.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -41,19 +43,17 @@ void UsedColumnsAndRows(const Bits256& bits, unsigned& columns, unsigned& rows) 
 
 HypothesisSets::HypothesisSets(const Problem& problem, bool canonical)
     : goal_(problem.goal), insertable_spread_(problem.insertable_spread) {
-  Cell low = problem.hypotheses.front().offset;
-  Cell high = low;
   int orientations = 1;
   double total = 0.0;
   bool uniform = true;
   for (const Hypothesis& h : problem.hypotheses) {
-    low = low.cwiseMin(h.offset);
-    high = high.cwiseMax(h.offset);
     orientations = std::max(orientations, h.orientation + 1);
     total += h.weight;
     uniform = uniform && h.weight == problem.hypotheses.front().weight;
   }
-  const Cell span = high - low + Cell::Ones();
+  const CellBox hull = HullOf(problem.hypotheses);
+  const Cell low = hull.min;
+  const Cell span = hull.Size();
   shiftable_ = canonical && uniform && span.x() <= kWindow && span.y() <= kWindow && span.z() <= 4096;
 
   // Layers: by orientation, then tile (one where sets are shiftable), then height.

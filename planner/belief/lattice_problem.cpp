@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/belief/hull.h"
 
 namespace feeler::planner {
 namespace {
@@ -64,13 +65,10 @@ Problem MakeLatticeProblem(const LatticeProblemData& data) {
   if (data.target.empty()) throw InputError(where, "the target has no cells");
   if (data.hypotheses.empty()) throw InputError(where, "no hypotheses", "give at least one");
   constexpr int kMostOffset = 100000;
-  Cell low = data.hypotheses.front().offset;
-  Cell high = low;
   for (const Hypothesis& h : data.hypotheses) {
     if (h.orientation != 0) throw InputError(where, "a hypothesis has an orientation", "lattice files have none");
-    low = low.cwiseMin(h.offset);
-    high = high.cwiseMax(h.offset);
   }
+  const auto [low, high] = HullOf(data.hypotheses);
   if ((data.size.array() > kMostOffset).any() || (low.array() < -kMostOffset).any() ||
       (high.array() > kMostOffset).any()) {
     throw InputError(where, "size or hypotheses out of range", fmt::format("at most {} cells", kMostOffset));

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/belief/hull.h"
 
 namespace feeler::planner {
 namespace {
@@ -89,14 +90,10 @@ Outcome Simulate(const Problem& problem, const Cell& r, const GuardedMove& move,
 bool IsGoal(const Problem& problem, const std::vector<Hypothesis>& hypotheses) {
   if (hypotheses.size() <= 1) return true;
   if (problem.goal == GoalKind::kSingleton) return false;
-  Cell low = hypotheses.front().offset;
-  Cell high = low;
   for (const Hypothesis& h : hypotheses) {
     if (h.orientation != hypotheses.front().orientation) return false;
-    low = low.cwiseMin(h.offset);
-    high = high.cwiseMax(h.offset);
   }
-  return ((high - low).array() <= problem.insertable_spread.array()).all();
+  return ((HullOf(hypotheses).Size() - Cell::Ones()).array() <= problem.insertable_spread.array()).all();
 }
 
 }  // namespace feeler::planner

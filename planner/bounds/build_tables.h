@@ -13,6 +13,7 @@ namespace feeler::planner {
 class PlanningTables;
 /// Builds what `options` needs for problems with the map, costs, move lengths and goal of `problem`; tables of cuboids,
 /// with `jobs` threads, for hypotheses that span no more than those of `problem` (larger sets are cut).
+/// After a cancellation of `options` they are incomplete: nothing may be looked up in them (`Solve` does not).
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
                                                           Parallelism jobs = {});
 

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <vector>
 
+#include "feeler/planner/belief/hull.h"
 #include "feeler/planner/bounds/certificates/certificate.h"
 #include "feeler/planner/bounds/cuboids/cuboid_heuristic.h"
 #include "feeler/planner/contact/fill_dead_ends.h"
@@ -13,17 +14,6 @@ namespace {
 
 Cell SpreadOf(const Problem& problem) {
   return problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
-}
-
-/// Extents of the box of the hypotheses.
-Cell ExtentsOf(const Problem& problem) {
-  Cell low = problem.hypotheses.front().offset;
-  Cell high = low;
-  for (const Hypothesis& h : problem.hypotheses) {
-    low = low.cwiseMin(h.offset);
-    high = high.cwiseMax(h.offset);
-  }
-  return high - low + Cell::Ones();
 }
 
 std::vector<int> OrientationsOf(const Problem& problem) {
@@ -46,11 +36,13 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
   pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
   const bool oriented = problem.map->orientations() > 1;
   if (oriented) {
-    const auto flags = std::make_shared<const StepFlagsGrid>(*problem.map, jobs);
-    oriented_pairs_ = std::make_shared<OrientedPairs>(flags, costs);
+    flags_ = std::make_shared<const StepFlagsGrid>(*problem.map, jobs);
+    oriented_pairs_ = std::make_shared<OrientedPairs>(flags_, costs);
     if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
-      oriented_ = std::make_shared<OrientedCertificates>(problem, *flags, costs, jobs, options.on_tables);
-      oriented_lines_ = std::make_shared<OrientedLines>(problem, *flags, costs, jobs, options.on_tables);
+      oriented_ = std::make_shared<OrientedCertificates>(problem, *flags_, costs, jobs, options.on_tables,
+                                                         options.cancellation);
+      oriented_lines_ =
+          std::make_shared<OrientedLines>(problem, *flags_, costs, jobs, options.on_tables, options.cancellation);
     }
   }
   switch (options.heuristic) {
@@ -69,11 +61,11 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
       cuboids_ = std::make_shared<CuboidTable>(
           *problem.map, masks_,
           motions.start > 0.0 ? CertificateTable(*problem.map, costs, SpreadOf(problem)) : *certificate_, costs,
-          SpreadOf(problem), ExtentsOf(problem), jobs);
+          SpreadOf(problem), HullOf(problem.hypotheses).Size(), jobs, options.cancellation);
       break;
     case HeuristicKind::kLines:
-      lines_ = oriented ? std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem), ExtentsOf(problem),
-                                                      OrientationsOf(problem))
+      lines_ = oriented ? std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
+                                                      HullOf(problem.hypotheses).Size(), OrientationsOf(problem))
                         : std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
                                                       Cell::Constant(LineTable::kLongest), std::vector<int>{0});
       break;
@@ -111,7 +103,29 @@ const PlanningTables::Filled& PlanningTables::filled() const {
         std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
                                           MotionCosts(problem_.cost, problem_.move_lengths), SpreadOf(problem_));
   });
+  has_filled_ = true;
   return filled_;
+}
+
+std::size_t PlanningTables::bytes() const {
+  std::size_t bytes = masks_.bytes() + pairs_->bytes();
+  const auto add = [&](const auto& table) {
+    if (table) bytes += table->bytes();
+  };
+  add(flags_);
+  add(certificate_);
+  add(oriented_);
+  add(oriented_pairs_);
+  add(oriented_lines_);
+  add(cuboids_);
+  add(lines_);
+  add(first_contact_);
+  add(local_certificate_);
+  if (has_filled_) {
+    add(filled_.tables);
+    add(filled_.bound);
+  }
+  return bytes;
 }
 
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <memory>
 #include <mutex>
 
@@ -22,6 +24,8 @@ class PlanningTables {
   PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs = {});
 
   const ContactMasks& masks() const { return masks_; }
+  /// Memory of all tables, those for the filled map included, as they stand: pairs are tabled when first asked for.
+  std::size_t bytes() const;
   /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
   std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets) const;
 
@@ -41,6 +45,7 @@ class PlanningTables {
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;
+  std::shared_ptr<const StepFlagsGrid> flags_;
   std::shared_ptr<const OrientedCertificates> oriented_;  ///< with their pairs, where the target has orientations
   std::shared_ptr<const OrientedPairs> oriented_pairs_;
   std::shared_ptr<const OrientedLines> oriented_lines_;
@@ -49,6 +54,7 @@ class PlanningTables {
   std::shared_ptr<const FirstContactTable> first_contact_;
   std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then
   mutable std::once_flag filled_once_;
+  mutable std::atomic<bool> has_filled_{false};  ///< filled_ is ready
   mutable Filled filled_;
 };
 

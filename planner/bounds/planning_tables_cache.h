@@ -2,23 +2,33 @@
 
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "feeler/planner/bounds/build_tables.h"
 
 namespace feeler::planner {
 
-/// The planning tables of a contact map, built at its first problem and shared by all that follow, as long as map, cost
-/// and goal stay the same. Thread-safe.
+/// Planning tables, built when a problem is met that none of those kept serves, and shared by all that they do serve.
+/// Thread-safe; what was asked for last is kept, kMost tables at most.
 class PlanningTablesCache {
  public:
+  static constexpr std::size_t kMost = 4;
+
+  /// Tables that serve the problem under the options. Law: a solver is led to the same bounds by them as by tables that
+  /// were built for a problem that covers this one (`Serves`).
   std::shared_ptr<const PlanningTables> TablesFor(const Problem& problem, const SolverOptions& options);
 
  private:
-  std::mutex mutex_;  // guards all below
-  std::shared_ptr<const ContactMap> map_;
-  CostWeights cost_;
-  GoalKind goal_ = GoalKind::kSingleton;
-  std::shared_ptr<const PlanningTables> tables_;
+  struct Entry {
+    Problem problem;  ///< that the tables were built for
+    SolverKind solver = SolverKind::kCertified;
+    HeuristicKind heuristic = HeuristicKind::kCertificate;
+    std::shared_ptr<const PlanningTables> tables;
+  };
+  static bool Serves(const Entry& entry, const Problem& problem, const SolverOptions& options);
+
+  std::mutex mutex_;            // guards entries_
+  std::vector<Entry> entries_;  // the last used comes last
 };
 
 }  // namespace feeler::planner

@@ -5,6 +5,7 @@
 
 #include "feeler/core/direction.h"
 #include "feeler/core/lattice.h"
+#include "feeler/core/lattice_grid.h"
 
 namespace feeler::planner {
 
@@ -57,8 +58,7 @@ class ContactMap {
 
   const Layer& layer(int orientation) const { return layers_[static_cast<std::size_t>(orientation)]; }
   std::size_t Index(const Cell& displacement) const {
-    const Cell c = domain_.Clamp(displacement) - domain_.min;
-    return static_cast<std::size_t>((std::int64_t{c.z()} * size_.y() + c.y()) * size_.x() + c.x());
+    return GridIndex(size_, domain_.Clamp(displacement) - domain_.min);
   }
 
  private:

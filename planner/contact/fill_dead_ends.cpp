@@ -4,20 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
+
 namespace feeler::planner {
-namespace {
-
-template <class F>
-void ForEachCell(const CellBox& box, F f) {
-  for (int z = box.min.z(); z <= box.max.z(); ++z) {
-    for (int y = box.min.y(); y <= box.max.y(); ++y) {
-      for (int x = box.min.x(); x <= box.max.x(); ++x) f(Cell(x, y, z));
-    }
-  }
-}
-
-}  // namespace
-
 std::shared_ptr<const ContactMap> FillDeadEnds(const ContactMap& map) {
   const CellBox& domain = map.domain();
   std::vector<ContactMap::Layer> layers;

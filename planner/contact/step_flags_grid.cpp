@@ -1,7 +1,6 @@
 #include "feeler/planner/contact/step_flags_grid.h"
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
+#include "feeler/core/worker_pool.h"
 
 namespace feeler::planner {
 StepFlagsGrid::StepFlagsGrid(const ContactMap& map, Parallelism jobs)
@@ -9,17 +8,11 @@ StepFlagsGrid::StepFlagsGrid(const ContactMap& map, Parallelism jobs)
       size_(domain_.Size()),
       flags_(static_cast<std::size_t>(map.orientations())),
       regions_(flags_.size()) {
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(jobs.threads()));
-  tbb::parallel_for(0, map.orientations(), [&](int o) {
-    std::vector<std::uint8_t>& flags = flags_[static_cast<std::size_t>(o)];
+  ParallelFor(flags_.size(), jobs, [&](std::size_t o) {
+    std::vector<std::uint8_t>& flags = flags_[o];
     flags.reserve(static_cast<std::size_t>(domain_.Count()));
-    for (int z = domain_.min.z(); z <= domain_.max.z(); ++z) {
-      for (int y = domain_.min.y(); y <= domain_.max.y(); ++y) {
-        for (int x = domain_.min.x(); x <= domain_.max.x(); ++x) flags.push_back(StepFlags(map, Cell(x, y, z), o));
-      }
-    }
-    regions_[static_cast<std::size_t>(o)] = Active(o);
+    ForEachCell(domain_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, static_cast<int>(o))); });
+    regions_[o] = Active(static_cast<int>(o));
   });
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/planner/contact/active_region.h"
 #include "feeler/planner/contact/contact_map.h"
@@ -15,12 +16,11 @@ namespace feeler::planner {
 class StepFlagsGrid {
  public:
   StepFlagsGrid(const ContactMap& map, Parallelism jobs);
+  std::size_t bytes() const { return flags_.size() * static_cast<std::size_t>(domain_.Count()); }
 
   int orientations() const { return static_cast<int>(flags_.size()); }
   std::uint8_t At(const Cell& displacement, int orientation) const {
-    const Cell c = domain_.Clamp(displacement) - domain_.min;
-    return flags_[static_cast<std::size_t>(orientation)]
-                 [static_cast<std::size_t>((std::int64_t{c.z()} * size_.y() + c.y()) * size_.x() + c.x())];
+    return flags_[static_cast<std::size_t>(orientation)][GridIndex(size_, domain_.Clamp(displacement) - domain_.min)];
   }
 
   struct Region {

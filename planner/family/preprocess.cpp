@@ -5,15 +5,14 @@
 #include <cmath>
 #include <condition_variable>
 #include <cstdlib>
-#include <exception>
 #include <limits>
 #include <mutex>
-#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "feeler/core/orientation_lattice.h"
+#include "feeler/core/worker_pool.h"
 
 namespace feeler::planner {
 namespace {
@@ -61,11 +60,8 @@ class Framework {
         tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)),
                                       WithFamilyBudget(solver_, traits_), options_.jobs);
       MarkStored();
-      std::vector<std::jthread> threads;
-      for (int i = 1; i < options_.jobs.threads(); ++i) threads.emplace_back([this] { Work(); });
-      Work();
+      RunOnThreads(options_.jobs.threads(), [this] { Work(); });
     }
-    if (failure_) std::rethrow_exception(failure_);
     summary_.cancelled = Cancelled();
     summary_.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return summary_;
@@ -120,7 +116,7 @@ class Framework {
   /// is nothing left to do.
   bool Take(std::unique_lock<std::mutex>& lock, std::size_t& taken, std::size_t& similar) {
     while (true) {
-      if (Cancelled() || failure_) return false;
+      if (Cancelled() || failed_) return false;
       while (first_open_ < order_.size() && states_[first_open_].progress != Progress::kOpen) ++first_open_;
       if (first_open_ == order_.size()) return false;
       const std::size_t end = std::min(order_.size(), first_open_ + kLookAhead);
@@ -176,7 +172,9 @@ class Framework {
       }
     } catch (...) {
       if (!lock.owns_lock()) lock.lock();
-      if (!failure_) failure_ = std::current_exception();
+      failed_ = true;
+      changed_.notify_all();
+      throw;
     }
     changed_.notify_all();
   }
@@ -198,7 +196,7 @@ class Framework {
   std::size_t first_open_ = 0;
   std::int64_t done_ = 0;
   PreprocessSummary summary_;
-  std::exception_ptr failure_;
+  bool failed_ = false;  ///< a thread threw: nothing further is begun
 };
 
 }  // namespace
@@ -207,6 +205,7 @@ SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family,
   if (solver.solver == SolverKind::kCertified && std::isinf(solver.time_limit_s) && std::isinf(solver.cpu_limit_s) &&
       solver.expansion_limit == std::numeric_limits<std::int64_t>::max()) {
     solver.expansion_limit = DefaultExpansionLimit(family, hypotheses);
+    solver.first_policy_in_any_case = true;
   }
   if (solver.solver == SolverKind::kCertified && solver.gap < kTightGap && solver.cuboids_where_tight &&
       solver.heuristic == HeuristicKind::kCertificate) {

@@ -53,8 +53,13 @@ struct SolverOptions {
   double time_limit_s = std::numeric_limits<double>::infinity();            ///< wall time; > 0
   double cpu_limit_s = std::numeric_limits<double>::infinity();             ///< CPU time of the solving thread; > 0
   std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();  ///< the deterministic budget; >= 1
-  /// Stop (as at an expansion limit) when the belief store has grown to this; about 1 kB an expansion.
-  std::size_t memory_limit_bytes = std::size_t{1} << 31;
+  /// Limits and cancellation hold for the first policy of the certified solver too, so that there may be none in the
+  /// end. True: it is completed whatever time, CPU time and expansions it takes (not against cancellation and memory);
+  /// for who needs some policy at any budget.
+  bool first_policy_in_any_case = false;
+  /// Stop when the belief store (about 1 kB an expansion), what the heuristic has cached and the tables together, which
+  /// all problems of a family share, have grown to this.
+  std::size_t memory_limit_bytes = std::size_t{1} << 32;
   std::uint64_t seed = 1;
   HeuristicKind heuristic = HeuristicKind::kCertificate;
   /// Families of problems at a gap below kTightGap take cuboids for certificates: see WithFamilyBudget.

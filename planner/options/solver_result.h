@@ -20,8 +20,9 @@ struct SolverResult {
   double expected_cost = 0.0;         ///< exact, over every hypothesis; infinity without a policy
   double lower_bound = 0.0;           ///< proven, never inflated
   std::int64_t trials = 0;
+  /// Accounts of all attempts at the problem together: where a policy leaves the workspace, there are two.
   std::int64_t expansions = 0;  ///< beliefs whose actions were all evaluated
-  double cpu_s = 0.0;           ///< of the solving thread
+  double cpu_s = 0.0;           ///< of the solving thread, from the call of `Solve` to its return
   double wall_s = 0.0;
   /// Pairs of indices of hypotheses that no probe tells apart (and the goal needs apart); empty unless unlocalizable.
   std::vector<std::pair<int, int>> indistinguishable;

@@ -14,18 +14,29 @@ namespace {
 /// Tours consider leaving for the filled map's policy at so many places at most.
 constexpr std::size_t kMostExits = 32;
 
-std::optional<SolverStatus> NeverStop(std::int64_t) { return std::nullopt; }
-
-int Distance(const Cell& a, const Cell& b) { return (a - b).cwiseAbs().sum(); }
-
 }  // namespace
 
 OpenPolicy::OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const OpenBound& openings,
                        GreedyCompletion<BeliefGraph>& completion)
     : graph_(graph), filled_(filled), openings_(openings), completion_(completion), filled_policy_(filled) {}
 
+std::optional<SolverStatus> OpenPolicy::Run(BeliefId start, StopCondition stop) {
+  stop_ = std::move(stop);
+  try {
+    Find(start, true);
+  } catch (const Stopped& stopped) {
+    return stopped.why;
+  }
+  return std::nullopt;
+}
+
+void OpenPolicy::CheckStop() const {
+  if (const std::optional<SolverStatus> why = stop_(expansions())) throw Stopped{*why};
+}
+
 double OpenPolicy::Complete(BeliefId b) {
-  completion_.Run(b, NeverStop);
+  completion_.Run(b, [&](std::int64_t) { return stop_(expansions()); });
+  CheckStop();
   return completion_.Solved(b) ? completion_.Value(b) : kInfinity;
 }
 
@@ -49,7 +60,8 @@ std::optional<BeliefId> OpenPolicy::Filled(BeliefId b) {
 double OpenPolicy::FilledValue(BeliefId b) {
   const std::optional<BeliefId> there = Filled(b);
   if (!there || std::isinf(filled_.Heuristic(*there))) return kInfinity;
-  filled_policy_.Run(*there, NeverStop);
+  filled_policy_.Run(*there, [&](std::int64_t) { return stop_(expansions()); });
+  CheckStop();
   return filled_policy_.Solved(*there) ? filled_policy_.Value(*there) : kInfinity;
 }
 
@@ -115,6 +127,7 @@ GuardedMove OpenPolicy::WithLooks(BeliefId b, const GuardedMove& move, double va
 }
 
 double OpenPolicy::Find(BeliefId b, bool tours) {
+  CheckStop();
   if (b >= found_.size()) found_.resize(std::max<std::size_t>(graph_.size(), b + std::size_t{1}), 0);
   if (found_[b] >= (tours ? 2 : 1)) return Solved(b) ? Value(b) : kInfinity;
   if (tours && graph_.sets().info(graph_.set(b)).slab_count == 1) {

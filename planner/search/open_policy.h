@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <unordered_map>
@@ -28,8 +29,9 @@ class OpenPolicy {
   OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const OpenBound& openings,
              GreedyCompletion<BeliefGraph>& completion);
 
-  /// Finds the policy from a belief.
-  void Run(BeliefId start) { Find(start, true); }
+  using StopCondition = std::function<std::optional<SolverStatus>(std::int64_t expansions)>;
+  /// Finds the policy from a belief, or says why `stop` ended the search for it.
+  std::optional<SolverStatus> Run(BeliefId start, StopCondition stop);
 
   bool Solved(BeliefId b) const { return Known(b) || completion_.Solved(b); }
   double Value(BeliefId b) const {
@@ -40,6 +42,7 @@ class OpenPolicy {
     const bool own = Known(b) && (!completion_.Solved(b) || nodes_[b].value < completion_.Value(b));
     return own ? nodes_[b].action : completion_.Action(b);
   }
+  /// On the map itself: those on the filled map are not counted.
   std::int64_t expansions() const { return expansions_ + completion_.expansions(); }
   std::int64_t trials() const { return 0; }
 
@@ -55,11 +58,16 @@ class OpenPolicy {
     GuardedMove move;
   };
   enum class TourKind { kSpiral, kSweep };
+  /// Thrown through the recursion when `stop_` ends it.
+  struct Stopped {
+    SolverStatus why;
+  };
 
   bool Known(BeliefId b) const { return b < nodes_.size() && nodes_[b].action >= 0; }
   /// Cost to go, times the weight, of the best of the ways above; of the first alone unless `tours`.
   double Find(BeliefId b, bool tours);
   double Complete(BeliefId b);
+  void CheckStop() const;
   /// The same belief on the filled map, less the hypotheses under which the tool is in an opening; none if the others
   /// are a goal.
   std::optional<BeliefId> Filled(BeliefId b);
@@ -82,6 +90,7 @@ class OpenPolicy {
   std::vector<State> nodes_;
   std::vector<char> found_;  ///< per belief: 1 found, 2 found with tours
   std::int64_t expansions_ = 0;
+  StopCondition stop_;
 };
 
 }  // namespace feeler::planner

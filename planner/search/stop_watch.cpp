@@ -12,7 +12,7 @@ double StopWatch::wall_s() const {
 }
 
 std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
-  if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
+  if (expansions_before_ + expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
   if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
   if ((++calls_ & 63) != 0) return std::nullopt;
   if (wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;

@@ -10,15 +10,19 @@
 
 namespace feeler::planner {
 
-/// The stop condition of a solver, and its clocks.
+/// The stop condition of a solver, and its clocks: one for all attempts at a problem.
 class StopWatch {
  public:
   explicit StopWatch(const SolverOptions& options);
 
   double wall_s() const;
   double cpu_s() const { return ThreadCpuSeconds() - cpu_start_s_; }
-  /// Why to stop now; empty to go on. Reads the clock only now and then.
+  /// Why to stop now; empty to go on. `expansions` of the attempt in work: those of earlier ones are added. Reads the
+  /// clock only now and then.
   std::optional<SolverStatus> Stop(std::int64_t expansions);
+  /// An attempt is over, another may follow.
+  void EndAttempt(std::int64_t expansions) { expansions_before_ += expansions; }
+  std::int64_t expansions_before() const { return expansions_before_; }
   /// True when a row of the bounds table is due: at first, then at growing intervals of time.
   bool RowDue();
 
@@ -27,6 +31,7 @@ class StopWatch {
   std::chrono::steady_clock::time_point start_;
   double cpu_start_s_ = 0.0;
   double next_row_s_ = 0.0;
+  std::int64_t expansions_before_ = 0;
   int calls_ = 0;
 };
 

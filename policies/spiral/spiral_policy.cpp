@@ -4,6 +4,7 @@
 #include <string>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/belief/hull.h"
 
 namespace feeler::policies {
 namespace {
@@ -24,13 +25,7 @@ void RequirePositive(const char* what, double value) {
 
 Eigen::Vector3d HalfWidths(const std::vector<Hypothesis>& hypotheses, double cell_m) {
   if (hypotheses.empty()) return Eigen::Vector3d::Zero();
-  Cell least = hypotheses.front().offset;
-  Cell most = least;
-  for (const Hypothesis& h : hypotheses) {
-    least = least.cwiseMin(h.offset);
-    most = most.cwiseMax(h.offset);
-  }
-  return 0.5 * cell_m * (most - least + Cell::Ones()).cast<double>();
+  return 0.5 * cell_m * planner::HullOf(hypotheses).Size().cast<double>();
 }
 
 SpiralPolicy::SpiralPolicy(Direction insertion, double cell_m, const SpiralTuning& tuning)

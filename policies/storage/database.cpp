@@ -230,7 +230,13 @@ void Database::Put(const StoredProblem& problem) {
       insert.Bind(15, std::int64_t{stored.extents.n_yaw}).Bind(16, std::int64_t{stored.extents.n_pitch});
     }
     insert.Bind(5, std::string_view(stored.status)).Bind(6, std::string_view(stored.solver));
-    insert.Bind(7, stored.epsilon);
+    if (state.version < 3) {
+      insert.Bind(7, stored.Promise());
+    } else if (stored.certified()) {
+      insert.BindNull(7).Bind(17, stored.gap);
+    } else {
+      insert.Bind(7, stored.epsilon).BindNull(17);
+    }
     if (row.blob.empty()) {
       insert.BindNull(8).BindNull(14);
     } else {

@@ -33,9 +33,12 @@ struct DatabaseIdentity {
 /// One problem of the family and what became of it.
 struct StoredProblem {
   planner::Extents extents;
-  std::string status;                                              ///< planner::ToString(SolverStatus)
-  std::string solver;                                              ///< planner::ToString(SolverKind)
-  double epsilon = 1.0;                                            ///< inflation (or gap) it was solved with
+  std::string status;  ///< planner::ToString(SolverStatus)
+  std::string solver;  ///< planner::ToString(SolverKind)
+  /// What it was solved with: the inflation of the heuristic by rtdp-bel and e-rtdp-bel, the gap by the certified
+  /// solver; the other one is 1.
+  double epsilon = 1.0;
+  double gap = 1.0;
   double expected_cost = std::numeric_limits<double>::infinity();  ///< the policy's; infinity without a policy
   double lower_bound = 0.0;                                        ///< proven
   std::int64_t expansions = 0;
@@ -45,6 +48,9 @@ struct StoredProblem {
   double cpu_s = 0.0;                          ///< measured; stands in a table of its own and is no part of the content
   double wall_s = 0.0;
 
+  bool certified() const;
+  /// The one of epsilon and gap that it was solved with.
+  double Promise() const { return certified() ? gap : epsilon; }
   /// Expected cost / lower bound; 1 if both are zero; infinity without a policy or a bound.
   double Ratio() const;
 };
@@ -81,7 +87,7 @@ struct DatabaseInfo {
 class Database {
  public:
   static constexpr std::uint32_t kApplicationId = 0x4645454C;  ///< "FEEL"
-  static constexpr int kVersion = 2;                           ///< user_version of files made; 1 is continued as it is
+  static constexpr int kVersion = 3;  ///< user_version of files made; older are continued as they are
 
   /// A new file; an existing one must be empty. Killed half-way it leaves an empty file, which counts as absent.
   static Database Create(const std::string& path, const DatabaseIdentity& identity);

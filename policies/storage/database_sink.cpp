@@ -29,7 +29,7 @@ StoredProblem ToStoredProblem(const planner::Extents& extents, const planner::So
   problem.extents = extents;
   problem.status = ToString(result.status);
   problem.solver = ToString(options.solver);
-  problem.epsilon = options.solver == planner::SolverKind::kCertified ? options.gap : options.epsilon;
+  (problem.certified() ? problem.gap : problem.epsilon) = problem.certified() ? options.gap : options.epsilon;
   problem.lower_bound = result.lower_bound;
   problem.expansions = result.expansions;
   problem.seed = options.seed;

@@ -90,7 +90,13 @@ int CheckHeader(const SqliteConnection& connection, const std::string& path) {
   return static_cast<int>(version);
 }
 
-const std::array<TableSchema, 3>& SchemaOf(int version) { return version == 1 ? kSchemaVersion1 : kSchemaVersion2; }
+const std::array<TableSchema, 3>& SchemaOf(int version) {
+  switch (version) {
+    case 1: return kSchemaVersion1;
+    case 2: return kSchemaVersion2;
+    default: return kSchemaVersion3;
+  }
+}
 
 void CheckSchema(const SqliteConnection& connection, int version, const std::string& path) {
   std::map<std::string, std::string> tables;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/options/solver_options.h"
 #include "feeler/policies/io/bytes.h"
 #include "feeler/policies/io/policy_blob.h"
 #include "feeler/policies/storage/hash.h"
@@ -15,6 +16,8 @@ namespace {
 bool SameBits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
 }  // namespace
+
+bool StoredProblem::certified() const { return solver == planner::ToString(planner::SolverKind::kCertified); }
 
 double StoredProblem::Ratio() const {
   if (lower_bound > 0.0) return expected_cost / lower_bound;
@@ -29,7 +32,7 @@ std::string RowBytes(const ProblemRow& row) {
   out.Text(ExtentsKey(p.extents));
   out.Text(p.status);
   out.Text(p.solver);
-  out.Double(p.epsilon);
+  out.Double(p.Promise());
   out.Double(p.expected_cost);
   out.Double(p.lower_bound);
   out.Signed(p.expansions);
@@ -55,10 +58,13 @@ ProblemRow ToRow(const StoredProblem& problem) {
   };
   for (int axis = 0; axis < planner::kAxisKinds; ++axis) require(problem.extents[axis] >= 1, "extents below 1");
   require(!std::isnan(problem.epsilon), "epsilon is not a number");
+  require(!std::isnan(problem.gap), "gap is not a number");
+  require((problem.certified() ? problem.epsilon : problem.gap) == 1.0, "has both an inflation and a gap");
   require(problem.lower_bound >= 0.0 && std::isfinite(problem.lower_bound), "lower bound negative or not finite");
   require(std::isfinite(problem.cpu_s) && std::isfinite(problem.wall_s), "times are not finite");
   ProblemRow row{problem, ""};
   row.problem.epsilon += 0.0;  // SQLite does not keep the sign of zero
+  row.problem.gap += 0.0;
   row.problem.policy.reset();
   if (problem.policy) {
     require(SameBits(problem.policy->expected_cost, problem.expected_cost), "expected cost is not the policy's");

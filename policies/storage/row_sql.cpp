@@ -12,9 +12,9 @@ namespace {
 std::string Select(int version, const char* tail) {
   return fmt::format(
       "SELECT problems.extents, nx, ny, nz, status, solver, epsilon, expected_cost, lower_bound, expansions, seed, "
-      "version, problems.checksum, policy, cpu_s, wall_s, timings.checksum, {} FROM problems LEFT JOIN timings ON "
+      "version, problems.checksum, policy, cpu_s, wall_s, timings.checksum, {}, {} FROM problems LEFT JOIN timings ON "
       "timings.extents = problems.extents {}",
-      version == 1 ? "1, 1" : "n_yaw, n_pitch", tail);
+      version == 1 ? "1, 1" : "n_yaw, n_pitch", version < 3 ? "epsilon" : "gap", tail);
 }
 }  // namespace
 
@@ -25,10 +25,12 @@ std::string SelectAll(int version) {
 std::string InsertOrUpdate(int version) {
   return fmt::format(
       "INSERT INTO problems (extents, nx, ny, nz, status, solver, epsilon, expected_cost, lower_bound, expansions, "
-      "seed, version, checksum, policy{}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14{}) ON "
+      "seed, version, checksum, policy{}{}) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14{}{}) "
+      "ON "
       "CONFLICT (extents) DO UPDATE SET status = ?5, solver = ?6, epsilon = ?7, expected_cost = ?8, lower_bound = ?9, "
-      "expansions = ?10, seed = ?11, version = ?12, checksum = ?13, policy = ?14",
-      version == 1 ? "" : ", n_yaw, n_pitch", version == 1 ? "" : ", ?15, ?16");
+      "expansions = ?10, seed = ?11, version = ?12, checksum = ?13, policy = ?14{}",
+      version == 1 ? "" : ", n_yaw, n_pitch", version < 3 ? "" : ", gap", version == 1 ? "" : ", ?15, ?16",
+      version < 3 ? "" : ", ?17", version < 3 ? "" : ", gap = ?17");
 }
 
 CheckedRow ReadRow(const SqliteStatement& statement, const std::string& path) {
@@ -41,7 +43,12 @@ CheckedRow ReadRow(const SqliteStatement& statement, const std::string& path) {
   problem.extents = {extent(1), extent(2), extent(3), extent(17), extent(18)};
   problem.status = statement.Text(4);
   problem.solver = statement.Text(5);
-  problem.epsilon = statement.Real(6);
+  // Up to version 2 one column holds either.
+  if (problem.certified()) {
+    problem.gap = statement.Real(19);
+  } else {
+    problem.epsilon = statement.Real(6);
+  }
   if (!statement.IsNull(7)) problem.expected_cost = statement.Real(7);
   problem.lower_bound = statement.Real(8);
   problem.expansions = statement.Integer(9);

@@ -39,5 +39,16 @@ inline constexpr std::array<TableSchema, 3> kSchemaVersion2 = {{
      "checksum INTEGER NOT NULL, policy BLOB)"},
     kTimings,
 }};
+/// The inflation and the gap in columns of their own: one of them is null.
+inline constexpr std::array<TableSchema, 3> kSchemaVersion3 = {{
+    kMeta,
+    {"problems",
+     "CREATE TABLE problems (id INTEGER PRIMARY KEY, extents TEXT NOT NULL UNIQUE, "
+     "nx INTEGER NOT NULL, ny INTEGER NOT NULL, nz INTEGER NOT NULL, n_yaw INTEGER NOT NULL, n_pitch INTEGER NOT NULL, "
+     "status TEXT NOT NULL, solver TEXT NOT NULL, epsilon REAL, gap REAL, expected_cost REAL, "
+     "lower_bound REAL NOT NULL, expansions INTEGER NOT NULL, seed INTEGER NOT NULL, version TEXT NOT NULL, "
+     "checksum INTEGER NOT NULL, policy BLOB)"},
+    kTimings,
+}};
 
 }  // namespace feeler::policies

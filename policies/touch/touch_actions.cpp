@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "feeler/planner/belief/hull.h"
+
 namespace feeler::policies {
 namespace {
 
@@ -23,15 +25,6 @@ int Length(const std::vector<GuardedMove>& way) {
   int cells = 0;
   for (const GuardedMove& move : way) cells += move.cells;
   return cells;
-}
-
-CellBox HullOf(const std::vector<Hypothesis>& hypotheses) {
-  CellBox hull{hypotheses.front().offset, hypotheses.front().offset};
-  for (const Hypothesis& h : hypotheses) {
-    hull.min = hull.min.cwiseMin(h.offset);
-    hull.max = hull.max.cwiseMax(h.offset);
-  }
-  return hull;
 }
 
 }  // namespace

@@ -77,6 +77,7 @@ TEST(Metamorphic, AnyBudgetGivesACompletePolicy) {
   for (const std::int64_t limit : {1, 100, 10000}) {
     SolverOptions options = Exact();
     options.expansion_limit = limit;
+    options.first_policy_in_any_case = true;
     const SolverResult result = Solve(problem, options);
     ASSERT_TRUE(result.complete());
     EXPECT_EQ(result.status, SolverStatus::kExpansionLimit);

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "feeler/planner/belief/hull.h"
+
 namespace feeler::workflow {
 namespace {
 
@@ -59,12 +61,9 @@ std::optional<Pose> DrawFallIn(const Task& task, const planner::Problem& problem
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.Index(i)]);
   std::optional<Eigen::Vector3d> target;  // lattice coordinates
   double least = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d lower = problem.hypotheses.front().offset.cast<double>();
-  Eigen::Vector3d upper = lower;
-  for (const planner::Hypothesis& h : problem.hypotheses) {
-    lower = lower.cwiseMin(h.offset.cast<double>());
-    upper = upper.cwiseMax(h.offset.cast<double>());
-  }
+  const CellBox hull = planner::HullOf(problem.hypotheses);
+  const Eigen::Vector3d lower = hull.min.cast<double>();
+  const Eigen::Vector3d upper = hull.max.cast<double>();
   for (const std::size_t i : order) {
     const planner::Hypothesis& h = problem.hypotheses[i];
     const auto hit = SquarestHit(task, problem, policy, h);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <exception>
 #include <filesystem>
@@ -11,11 +10,11 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "feeler/core/error.h"
 #include "feeler/core/random.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/perception/input_file.h"
 #include "feeler/version.h"
@@ -175,42 +174,30 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
     partial.flush();
   }
 
-  std::mutex mutex;  // guards samples, partial, error, done
-  std::exception_ptr error;
-  std::atomic<std::size_t> next{0};
-  std::atomic<bool> stop{false};
-  auto done = static_cast<std::int64_t>(
-      std::count_if(samples.begin(), samples.end(), [](const auto& s) { return s.has_value(); }));
+  std::vector<std::size_t> missing;
+  for (std::size_t index = 0; index < samples.size(); ++index) {
+    if (!samples[index]) missing.push_back(index);
+  }
+  const auto had = static_cast<std::int64_t>(samples.size() - missing.size());
+  std::mutex mutex;  // guards camera_m, which all see at the same place
   Eigen::Vector3d camera_m = Eigen::Vector3d::Zero();
-  const auto work = [&] {
-    try {
-      CameraCell cell(scene, finder, options.noise);
-      {
-        const std::lock_guard lock(mutex);
-        camera_m = cell.eye_m();
-      }
-      while (!stop && !(options.cancellation != nullptr && options.cancellation->cancelled())) {
-        const std::size_t index = next++;
-        if (index >= samples.size()) return;
-        if (samples[index]) continue;  // only this thread writes at this index
-        const CalibrationSample sample = Take(cell, static_cast<std::int64_t>(index), options);
-        const std::lock_guard lock(mutex);
-        samples[index] = sample;
-        if (partial.is_open()) partial << ToJson(sample).dump() << "\n" << std::flush;
-        ++done;
-        if (options.progress) options.progress(done, static_cast<std::int64_t>(samples.size()));
-      }
-    } catch (...) {
+  const auto make_worker = [&] {
+    auto cell = std::make_unique<CameraCell>(scene, finder, options.noise);
+    {
       const std::lock_guard lock(mutex);
-      if (!error) error = std::current_exception();
-      stop = true;
+      camera_m = cell->eye_m();
     }
+    return [&, cell = std::move(cell)](std::size_t i) {
+      return Take(*cell, static_cast<std::int64_t>(missing[i]), options);
+    };
   };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < options.jobs.threads(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
-  if (error) std::rethrow_exception(error);
+  const auto keep = [&](std::size_t i, const CalibrationSample& sample) {
+    samples[missing[i]] = sample;
+    if (partial.is_open()) partial << ToJson(sample).dump() << "\n" << std::flush;
+    const auto done = had + static_cast<std::int64_t>(i) + 1;
+    if (options.progress) options.progress(done, static_cast<std::int64_t>(samples.size()));
+  };
+  RunInOrder(missing.size(), options.jobs, make_worker, keep, options.cancellation);
 
   for (const auto& sample : samples) {
     if (sample) calibration.samples.push_back(*sample);

@@ -1,12 +1,9 @@
 #include "feeler/workflow/setup/database_builder.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -14,6 +11,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/orientation_lattice.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/policies/storage/database_sink.h"
 #include "feeler/policies/storage/verify.h"
 #include "feeler/version.h"
@@ -107,13 +105,9 @@ DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Databa
   DatabaseVerification result;
   result.problems = static_cast<std::int64_t>(problems.size());
   std::vector<std::string> faults(problems.size());
-  std::mutex mutex;
-  std::int64_t done = 0;
+  std::mutex mutex;  // guards result
 
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(jobs.threads()));
-  tbb::parallel_for(std::size_t{0}, problems.size(), [&](std::size_t i) {
-    if (cancellation != nullptr && cancellation->cancelled()) return;
+  const auto verify = [&](std::size_t i) {
     const auto stored = database.Get(problems[i].extents);
     double error = 0.0;
     int hypotheses = 0;
@@ -128,9 +122,8 @@ DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Databa
     if (hypotheses > 0) ++result.policies;
     result.hypotheses += hypotheses;
     result.largest_cost_error = std::max(result.largest_cost_error, error);
-    ++done;
-    if (progress) progress(done, result.problems);
-  });
+  };
+  ParallelFor(problems.size(), jobs, verify, progress, cancellation);
   for (const std::string& fault : faults) {
     if (fault.empty()) continue;
     if (result.first_fault.empty()) result.first_fault = fault;

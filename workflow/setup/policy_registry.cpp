@@ -40,9 +40,33 @@ class RegionCache {
   std::shared_ptr<const planner::ActiveRegion> region_;
 };
 
+/// The stored policies that episodes have met, each read and decoded once and shared by all episodes and threads.
+class StoredPolicies {
+ public:
+  explicit StoredPolicies(std::shared_ptr<policies::Database> database) : database_(std::move(database)) {}
+
+  /// Null if the database holds none for the problem.
+  std::shared_ptr<const planner::PolicyGraph> Get(const planner::Extents& extents) {
+    const std::lock_guard lock(mutex_);
+    const auto [known, added] = known_.try_emplace(extents);
+    if (added) {
+      std::optional<policies::StoredProblem> stored = database_->Get(extents);
+      if (stored && stored->policy) {
+        known->second = std::make_shared<const planner::PolicyGraph>(*std::move(stored->policy));
+      }
+    }
+    return known->second;
+  }
+
+ private:
+  std::shared_ptr<policies::Database> database_;
+  std::mutex mutex_;  // guards known_
+  std::map<planner::Extents, std::shared_ptr<const planner::PolicyGraph>> known_;
+};
+
 /// What the policies of a factory share.
 struct Shared {
-  std::shared_ptr<policies::Database> database;
+  std::shared_ptr<StoredPolicies> stored;  ///< null without a database
   PolicyOptions options;
   std::shared_ptr<planner::PlanningTablesCache> tables = std::make_shared<planner::PlanningTablesCache>();
   std::shared_ptr<VisualGoalOnce> visual_goal = std::make_shared<VisualGoalOnce>();
@@ -61,9 +85,8 @@ struct Entry {
 constexpr std::int64_t kOutsideExpansions = 3000;
 
 PolicyPointer MakeDatabase(const PolicyRequest& request, const Shared& shared) {
-  const auto stored = shared.database->Get(request.extents);
-  if (stored && stored->policy) {
-    return std::make_unique<policies::DatabasePolicy>(std::make_shared<const planner::PolicyGraph>(*stored->policy));
+  if (auto stored = shared.stored->Get(request.extents)) {
+    return std::make_unique<policies::DatabasePolicy>(std::move(stored));
   }
   policies::OnlineOptions online = shared.options.online;
   if (!online.expansion_limit) online.expansion_limit = kOutsideExpansions;
@@ -280,7 +303,9 @@ bool UsesLadder(const std::string& name) { return Find(name).uses_ladder; }
 PolicyFactory MakePolicyFactory(const std::string& name, std::shared_ptr<policies::Database> database,
                                 const PolicyOptions& options) {
   const bool has_database = database != nullptr;
-  const PolicyEntry entry = Find(name, std::make_shared<const Shared>(Shared{std::move(database), options}));
+  const PolicyEntry entry =
+      Find(name, std::make_shared<const Shared>(
+                     Shared{has_database ? std::make_shared<StoredPolicies>(std::move(database)) : nullptr, options}));
   if (entry.needs_database && !has_database) {
     throw InputError("--policy " + name, "needs a database", "give one with --db FILE.db");
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_walks.h"
 #include "feeler/planner/bounds/certificates/guarded_certificates.h"
 
@@ -77,10 +78,7 @@ void TableGuardedCertificates(const ContactMap& map, int orientation, const Cert
   for (const Cell& other : others) reach = reach.cwiseMax(other.cwiseAbs());
   const CellBox wide{grid.domain.min - reach, grid.domain.max + reach};
   const Cell size = wide.Size();
-  const auto index = [&](const Cell& here) {
-    const Cell c = here - wide.min;
-    return static_cast<std::size_t>((std::int64_t{c.z()} * size.y() + c.y()) * size.x() + c.x());
-  };
+  const auto index = [&](const Cell& here) { return GridIndex(size, here - wide.min); };
   for (const Direction d : kDirections) {
     const auto k = static_cast<std::size_t>(IndexOf(d));
     std::vector<std::uint8_t> travel;

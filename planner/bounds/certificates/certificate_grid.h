@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "feeler/core/lattice.h"
+#include "feeler/core/lattice_grid.h"
 #include "feeler/core/task.h"
 #include "feeler/planner/contact/active_region.h"
 #include "feeler/planner/contact/contact_map.h"
@@ -52,10 +53,7 @@ struct CertificateGrid : TableUnits {
       : CertificateGrid(ActiveRegion(map), costs, reach) {}
   CertificateGrid() = default;
 
-  std::size_t Index(const Cell& displacement) const {
-    const Cell c = domain.Clamp(displacement) - domain.min;
-    return static_cast<std::size_t>((std::int64_t{c.z()} * size.y() + c.y()) * size.x() + c.x());
-  }
+  std::size_t Index(const Cell& displacement) const { return GridIndex(size, domain.Clamp(displacement) - domain.min); }
   /// Cost in table units of the way back to the grid, where nothing can be told before.
   std::uint32_t WayBack(const Cell& displacement) const {
     if (domain.Contains(displacement)) return 0;
@@ -68,7 +66,7 @@ struct CertificateGrid : TableUnits {
     return static_cast<std::uint32_t>(cells_back) * free_units;
   }
   /// Change of `Index` per cell along x, y, z, inside the domain.
-  std::array<std::int64_t, 3> strides() const { return {1, size.x(), std::int64_t{size.x()} * size.y()}; }
+  std::array<std::int64_t, 3> strides() const { return GridStrides(size); }
 
   CellBox domain;
   Cell size = Cell::Zero();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_walks.h"
 
 namespace feeler::planner {
@@ -15,7 +16,7 @@ FirstContactTable::FirstContactTable(const ContactMap& map, const StepCosts& cos
   std::vector<std::uint16_t> planes(2 * cells_);
   for (int o = 0; o < map.orientations(); ++o) {
     CertificateWalks walks;
-    walks.strides = {1, size_.x(), std::int64_t{size_.x()} * size_.y()};
+    walks.strides = GridStrides(size_);
     walks.enters.assign(cells_, 0);
     std::uint32_t cell = 0;
     for (int z = domain_.min.z(); z <= domain_.max.z(); ++z) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/belief/belief_heuristic.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/contact/contact_map.h"
@@ -15,10 +16,10 @@ class FirstContactTable {
  public:
   FirstContactTable(const ContactMap& map, const StepCosts& costs);
   double unit() const { return unit_; }
+  std::size_t bytes() const { return values_.size() * sizeof(values_[0]); }
   std::uint16_t At(const Cell& displacement, int orientation) const {
-    const Cell c = domain_.Clamp(displacement) - domain_.min;
     return values_[static_cast<std::size_t>(orientation) * cells_ +
-                   static_cast<std::size_t>((std::int64_t{c.z()} * size_.y() + c.y()) * size_.x() + c.x())];
+                   GridIndex(size_, domain_.Clamp(displacement) - domain_.min)];
   }
 
  private:

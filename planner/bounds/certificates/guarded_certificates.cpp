@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_walks.h"
 
 namespace feeler::planner {
@@ -14,7 +15,7 @@ class Filler {
  public:
   Filler(const GuardedWalks& walks, int bits, std::uint16_t* planes)
       : walks_(walks), bits_(bits), planes_(planes), cells_(static_cast<std::size_t>(walks.size.prod())) {
-    strides_ = {1, walks.size.x(), std::int64_t{walks.size.x()} * walks.size.y()};
+    strides_ = GridStrides(walks.size);
     // Where moves tell nothing, whatever the mask: contact with a wall that is the same under all is a move too.
     for (std::size_t d = 0; d < kDirectionCount; ++d) {
       silent_[d].resize(cells_);
@@ -43,10 +44,7 @@ class Filler {
   }
 
  private:
-  Cell At(std::size_t cell) const {
-    const auto c = static_cast<int>(cell);
-    return {c % walks_.size.x(), c / walks_.size.x() % walks_.size.y(), c / (walks_.size.x() * walks_.size.y())};
-  }
+  Cell At(std::size_t cell) const { return GridCell(walks_.size, cell); }
   /// Where a motion of `steps` ends; at the border if beyond.
   std::size_t End(std::size_t cell, int position, Direction d, int steps) const {
     const int axis = AxisOf(d);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/guarded_certificates.h"
 
 namespace feeler::planner {
@@ -104,7 +105,7 @@ void LocalCertificateTable::Fill(const Problem& problem, int hypothesis, std::ui
   CertificateWalks walks;
   walks.start_cost = start_units;
   walks.step_cost = free_units;
-  walks.strides = {1, size_.x(), std::int64_t{size_.x()} * size_.y()};
+  walks.strides = GridStrides(size_);
   walks.enters.assign(plane_size_, 0);
   const auto& mine = problem.hypotheses[static_cast<std::size_t>(hypothesis)];
   const auto& others = others_[static_cast<std::size_t>(hypothesis)];

@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/belief/belief_heuristic.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
@@ -28,14 +29,12 @@ class LocalCertificateTable {
   /// Indices of the others of a hypothesis (problem order).
   const std::vector<int>& others(int hypothesis) const { return others_[static_cast<std::size_t>(hypothesis)]; }
   double unit() const { return unit_; }
+  std::size_t bytes() const { return values_.size() * sizeof(values_[0]); }
   const CellBox& workspace() const { return workspace_; }
   std::size_t plane_size() const { return plane_size_; }
   /// Plane (hypothesis, mask) starts at ((hypothesis << bits) + mask) * plane_size().
   const std::uint16_t* values() const { return values_.data(); }
-  std::size_t Index(const Cell& robot) const {
-    const Cell c = robot - workspace_.min;
-    return static_cast<std::size_t>((std::int64_t{c.z()} * size_.y() + c.y()) * size_.x() + c.x());
-  }
+  std::size_t Index(const Cell& robot) const { return GridIndex(size_, robot - workspace_.min); }
 
  private:
   void FillGuarded(const Problem& problem, int hypothesis, const TableUnits& units);

@@ -26,6 +26,13 @@ const PairCertificates::Plane& PairCertificates::Get(const Cell& offset, int ori
   return *plane;
 }
 
+std::size_t PairCertificates::bytes() const {
+  const std::lock_guard lock(mutex_);
+  std::size_t bytes = 0;
+  for (const auto& known : planes_) bytes += known.second->values.size() * sizeof(std::uint16_t);
+  return bytes;
+}
+
 std::optional<Cell> NearestToTellApart(const HypothesisSets& sets, SetId set, const Cell& member, int orientation,
                                        const Cell& spread) {
   std::optional<Cell> nearest;

@@ -35,6 +35,8 @@ class PairCertificates {
   const Plane& Get(const Cell& offset, int orientation) const;
   /// A goal leaves hypotheses at most this far apart, per axis.
   const Cell& spread() const { return spread_; }
+  /// Of the tables built so far.
+  std::size_t bytes() const;
 
  private:
   std::shared_ptr<const ContactMap> map_;

@@ -2,35 +2,20 @@
 
 #include <algorithm>
 #include <atomic>
-#include <thread>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
+#include "feeler/core/worker_pool.h"
 #include "feeler/planner/bounds/cuboids/box_partition.h"
 
 namespace feeler::planner {
 namespace {
-
-template <class F>
-void ForEachCell(const CellBox& box, F f) {
-  for (int z = box.min.z(); z <= box.max.z(); ++z) {
-    for (int y = box.min.y(); y <= box.max.y(); ++y) {
-      for (int x = box.min.x(); x <= box.max.x(); ++x) f(Cell(x, y, z));
-    }
-  }
-}
-
-/// Of a grid of `size` cells, x fastest.
-struct Strides {
-  explicit Strides(const Cell& size) : along{1, size.x(), std::int64_t{size.x()} * size.y()} {}
-  std::array<std::int64_t, 3> along;
-};
 
 /// out(x) = OR over i < count of in(x - i) along an axis; cells before the first are like the first, beyond the last
 /// like the last.
 void OrAlong(int axis, int count, const Cell& in_size, const std::vector<std::uint8_t>& in, const Cell& out_size,
              std::vector<std::uint8_t>& out) {
   out.assign(static_cast<std::size_t>(out_size.prod()), 0);
-  const Strides in_strides(in_size);
   const int inner = axis == 0 ? 1 : axis == 1 ? out_size.x() : out_size.x() * out_size.y();
   const int outer = axis == 0 ? out_size.y() * out_size.z() : axis == 1 ? out_size.z() : 1;
   for (int o = 0; o < outer; ++o) {
@@ -59,7 +44,8 @@ struct CuboidTable::Scratch {
 };
 
 CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
-                         const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs)
+                         const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs,
+                         const CancellationToken* cancellation)
     : spread_(spread), largest_(largest.cwiseMin(kLongest)) {
   const TableUnits units(costs);
   unit_ = units.unit;
@@ -83,12 +69,12 @@ CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const
       for (int o = 0; o < map.orientations(); ++o) level.emplace_back(size, o);
     });
     std::atomic<std::size_t> next = 0;
-    const auto work = [&](Scratch& mine) {
-      for (std::size_t i = next++; i < level.size(); i = next++) Fill(source, level[i].first, level[i].second, mine);
-    };
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 1; i < scratch.size(); ++i) threads.emplace_back([&work, &scratch, i] { work(scratch[i]); });
-    work(scratch.front());
+    RunWorkers(
+        level.size(), jobs,
+        [&] {
+          return [&, &mine = scratch[next++]](std::size_t i) { Fill(source, level[i].first, level[i].second, mine); };
+        },
+        cancellation);
   }
 }
 
@@ -192,7 +178,7 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
   Plane& plane = planes_[PlaneIndex(size, orientation)];
   plane = Shape(size);
   const Cell& stored = plane.stored;
-  const Strides strides(stored);
+  const auto strides = GridStrides(stored);
   // The OR over the cuboid of the flags of its hypotheses.
   Cell shape = active_.Size();
   scratch.flags = flags_[static_cast<std::size_t>(orientation)];
@@ -259,7 +245,7 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
     for (const Direction d : kDirections) {
       if ((flags >> IndexOf(d) & 1) != 0) continue;
       const std::uint32_t there = plane.values[static_cast<std::size_t>(
-          static_cast<std::int64_t>(here) + SignOf(d) * strides.along[static_cast<std::size_t>(AxisOf(d))])];
+          static_cast<std::int64_t>(here) + SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))])];
       if (there < kUnreachable - step_cost) best = std::min(best, there + step_cost);
     }
     plane.values[here] = best;

@@ -6,6 +6,7 @@
 
 #include "feeler/core/lattice.h"
 #include "feeler/core/parallelism.h"
+#include "feeler/core/progress.h"
 #include "feeler/planner/belief/contact_masks.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
@@ -30,10 +31,11 @@ class CuboidTable {
   static constexpr int kSmallBox = 8;
 
   /// Cuboids of up to `largest` hypotheses per axis (at most 16 count). `masks` are of `map`. The values do not depend
-  /// on the number of threads.
+  /// on the number of threads. Unusable after a cancellation.
   /// `certificates` are of `map`, the goal and costs at most these; they bound what is left in small boxes.
   CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
-              const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs);
+              const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs,
+              const CancellationToken* cancellation = nullptr);
 
   const Cell& largest() const { return largest_; }
   double unit() const { return unit_; }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -55,7 +57,7 @@ std::size_t Faces(const ContactMap& map, std::size_t most) {
 LeavingBound::LeavingBound(const Problem& problem) : problem_(problem), domain_(problem.map->domain()) {
   assert(Fits(problem));
   const Cell size = domain_.Size();
-  strides_ = {1, size.x(), std::int64_t{size.x()} * size.y()};
+  strides_ = GridStrides(size);
   radius_ = problem.workspace.Size().z() == 1 ? kRadius2d : kRadius3d;
   if (problem.goal == GoalKind::kInsertable) {
     most_in_goal_ = static_cast<std::size_t>((problem.insertable_spread + Cell::Ones()).cast<std::int64_t>().prod());
@@ -174,8 +176,7 @@ const LeavingBound::Probes& LeavingBound::ProbesOfSet(SetId set, const Group& gr
       const Cell place = face + offset;
       if (!problem_.workspace.Contains(place)) continue;
       const Cell o = place - problem_.workspace.min;
-      std::uint32_t& seen =
-          seen_[static_cast<std::size_t>((std::int64_t{o.z()} * size.y() + o.y()) * size.x() + o.x())];
+      std::uint32_t& seen = seen_[GridIndex(size, o)];
       if (std::exchange(seen, sets_seen_) != sets_seen_) places.push_back(place);
     }
   }
@@ -282,7 +283,7 @@ std::vector<LeavingBound::Layer> LeavingBound::LayersOfGroup(const Group& group,
   std::vector<char> seen(static_cast<std::size_t>(box.Count()), 0);
   const auto see = [&](const Cell& c) {
     const Cell o = c - box.min;
-    char& it = seen[static_cast<std::size_t>((std::int64_t{o.z()} * size.y() + o.y()) * size.x() + o.x())];
+    char& it = seen[GridIndex(size, o)];
     return std::exchange(it, 1) == 0;
   };
   std::vector<const std::uint8_t*> tables;

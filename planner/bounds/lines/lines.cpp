@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/equal_steps.h"
 
 namespace feeler::planner {
@@ -53,7 +54,7 @@ LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& 
 void LineTable::Fill(const ContactMap& map, int axis, int orientation, int spread, std::uint32_t free_units,
                      std::uint32_t contact_units) {
   Grid& grid = grids_[static_cast<std::size_t>(axis)];
-  const std::array<std::int64_t, 3> strides = {1, grid.size.x(), std::int64_t{grid.size.x()} * grid.size.y()};
+  const std::array<std::int64_t, 3> strides = GridStrides(grid.size);
   const std::int64_t along = strides[static_cast<std::size_t>(axis)];
   // Bit i: the step is blocked (the cell is blocked) at `cell` - i along the axis, that is under hypothesis i of the
   // line.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "feeler/core/lattice.h"
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/belief/belief_heuristic.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/pair_certificates.h"
@@ -37,6 +38,11 @@ class LineTable {
                     grid.cells +
                 grid.Index(displacement)];
   }
+  std::size_t bytes() const {
+    std::size_t bytes = 0;
+    for (const Grid& grid : grids_) bytes += grid.values.size() * sizeof(grid.values[0]);
+    return bytes;
+  }
   int longest(int axis) const { return grids_[static_cast<std::size_t>(axis)].longest; }
 
  private:
@@ -47,8 +53,7 @@ class LineTable {
     int longest = 1;
     std::vector<std::uint16_t> values;
     std::size_t Index(const Cell& displacement) const {
-      const Cell c = domain.Clamp(displacement) - domain.min;
-      return static_cast<std::size_t>((std::int64_t{c.z()} * size.y() + c.y()) * size.x() + c.x());
+      return GridIndex(size, domain.Clamp(displacement) - domain.min);
     }
   };
   void Fill(const ContactMap& map, int axis, int orientation, int spread, std::uint32_t free_units,

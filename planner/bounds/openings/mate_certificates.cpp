@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_walks.h"
 
 namespace feeler::planner {
@@ -24,14 +25,7 @@ const MateCertificates::Table& MateCertificates::Within(const std::array<int, 2>
   walks.start_cost = grid.start_units;
   walks.enters.assign(grid.cells, 0);
   const CellBox& domain = grid.domain;
-  const auto for_each_cell = [&](auto f) {
-    for (int z = domain.min.z(); z <= domain.max.z(); ++z) {
-      for (int y = domain.min.y(); y <= domain.max.y(); ++y) {
-        for (int x = domain.min.x(); x <= domain.max.x(); ++x) f(Cell(x, y, z));
-      }
-    }
-  };
-  for_each_cell([&](const Cell& here) {
+  ForEachCell(domain, [&](const Cell& here) {
     if (map_->Blocked(here, orientation)) return;
     const auto from = static_cast<std::uint32_t>(grid.Index(here));
     for (const Direction d : kDirections) {
@@ -65,12 +59,19 @@ const MateCertificates::Table& MateCertificates::Within(const std::array<int, 2>
     const auto rest = static_cast<float>(per_step * (value - std::min<std::uint32_t>(value, grid.start_units)));
     mates->planes[i] = value == kNoCertificate ? kNone : std::min(rest, kNone);
   }
-  for_each_cell([&](const Cell& here) {
+  ForEachCell(domain, [&](const Cell& here) {
     if (!map_->Blocked(here, orientation)) return;
     for (std::size_t plane = 0; plane < 3; ++plane) mates->planes[plane * grid.cells + grid.Index(here)] = -1.0F;
   });
   known = std::move(mates);
   return *known;
+}
+
+std::size_t MateCertificates::bytes() const {
+  const std::lock_guard lock(mutex_);
+  std::size_t bytes = 0;
+  for (const auto& known : tables_) bytes += known.second->planes.size() * sizeof(float);
+  return bytes;
 }
 
 }  // namespace feeler::planner

@@ -29,6 +29,8 @@ class MateCertificates {
 
   MateCertificates(std::shared_ptr<const ContactMap> map, const StepCosts& costs, const Cell& spread);
 
+  /// Of the tables built so far.
+  std::size_t bytes() const;
   const Table& Within(const std::array<int, 2>& reach, int orientation) const;
 
  private:

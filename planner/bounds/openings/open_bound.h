@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <tuple>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "feeler/planner/belief/hypothesis_sets.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
 #include "feeler/planner/bounds/openings/mate_certificates.h"
+#include "feeler/planner/bounds/openings/open_layer.h"
 #include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::planner {
@@ -28,7 +30,7 @@ namespace feeler::planner {
 /// least: openings by their rank in time, other hypotheses by the way to s, the delay, and their certificates from
 /// there on the map whose dead ends are filled.
 ///
-/// Immutable but for a cache of layers' values; safe to use from many threads.
+/// Immutable but for a bounded cache of layers' values; safe to use from many threads.
 class OpenBound {
  public:
   /// `filled` is FillDeadEnds(*open), `masks` and `certificates` are of `filled` and outlive this. `costs` are those of
@@ -40,6 +42,8 @@ class OpenBound {
   /// uniform. `robot` is relative to the set's frame.
   double Weighted(const HypothesisSets& sets, SetId set, const Cell& robot) const;
 
+  std::size_t bytes() const;
+
   /// Where the dead ends of an orientation begin: steps that are free on the map and blocked on the filled one.
   struct Openings {
     std::vector<Cell> mouths;           ///< displacements from which a step leads into a dead end
@@ -49,12 +53,22 @@ class OpenBound {
   const Openings& openings(int orientation) const { return openings_[static_cast<std::size_t>(orientation)]; }
 
  private:
-  struct Layer;
-  struct Candidate;
+  static constexpr std::size_t kMostKnown = std::size_t{1} << 17;  ///< values of layers kept
+  struct Split;
+  using Places = std::vector<std::vector<Cell>>;  ///< by distance from the tool
+
+  void FillPlanes(int orientation);
+  /// In free steps, times the number of members; `robot` relative to the corner of the window.
   double LayerBound(const Bits256& members, int orientation, const Cell& robot) const;
-  void Evaluate(const Layer& layer, Candidate& candidate, bool refine) const;
-  /// From a place to the nearest opening of a member.
-  double WayTo(const Layer& layer, std::size_t member, const Cell& from) const;
+  /// None if the tool is in the opening of a member.
+  std::optional<OpenLayer> MakeLayer(const Bits256& members, int orientation, const Cell& robot) const;
+  void FindNeighbours(const Bits256& members, OpenLayer& layer) const;
+  void FindMates(const Bits256& members, OpenLayer& layer) const;
+  /// Also sets off(h) of the members; `box` holds all that is not repeated beyond it.
+  Places FindPlaces(const Bits256& members, const Cell& robot, const CellBox& box, int radius, OpenLayer& layer) const;
+  static void LowerOff(const Split& split, OpenLayer& layer);
+  /// The least over the places of the first split, and over there being none.
+  double LeastOverPlaces(const Bits256& members, const Cell& robot, double without_split, OpenLayer& layer) const;
 
   std::shared_ptr<const ContactMap> filled_;
   const ContactMasks& masks_;

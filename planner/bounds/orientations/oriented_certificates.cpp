@@ -1,12 +1,11 @@
 #include "feeler/planner/bounds/orientations/oriented_certificates.h"
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <mutex>
+
+#include "feeler/core/worker_pool.h"
+#include "feeler/planner/belief/hull.h"
 
 namespace feeler::planner {
 namespace {
@@ -15,15 +14,12 @@ constexpr unsigned kBlockedSteps = (1U << kDirectionCount) - 1;
 
 /// Axis neighbours in position and angle, along the axes in which the hypotheses differ.
 std::vector<OrientedNeighbour> NeighboursIn(const Problem& problem, const Cell& spread) {
-  Cell low = problem.hypotheses.front().offset;
-  Cell high = low;
+  const Cell across = HullOf(problem.hypotheses).Size() - Cell::Ones();
   int low_yaw = 1 << 20;
   int high_yaw = 0;
   int low_pitch = 1 << 20;
   int high_pitch = 0;
   for (const Hypothesis& h : problem.hypotheses) {
-    low = low.cwiseMin(h.offset);
-    high = high.cwiseMax(h.offset);
     low_yaw = std::min(low_yaw, h.orientation / problem.pitches);
     high_yaw = std::max(high_yaw, h.orientation / problem.pitches);
     low_pitch = std::min(low_pitch, h.orientation % problem.pitches);
@@ -32,7 +28,7 @@ std::vector<OrientedNeighbour> NeighboursIn(const Problem& problem, const Cell& 
   std::vector<OrientedNeighbour> neighbours;
   for (const Direction d : kDirections) {
     const int axis = AxisOf(d);
-    if (high[axis] - low[axis] > spread[axis]) neighbours.push_back({(spread[axis] + 1) * UnitCell(d), 0, 0});
+    if (across[axis] > spread[axis]) neighbours.push_back({(spread[axis] + 1) * UnitCell(d), 0, 0});
   }
   for (const int by : {1, -1}) {
     if (high_yaw > low_yaw) neighbours.push_back({Cell::Zero(), by, 0});
@@ -240,7 +236,8 @@ std::uint32_t OrientedBox::WayBack(const Cell& displacement) const {
 }
 
 OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
-                                           Parallelism jobs, const ProgressCallback& progress)
+                                           Parallelism jobs, const ProgressCallback& progress,
+                                           const CancellationToken* cancellation)
     : unit_(costs.free), layers_(static_cast<std::size_t>(flags.orientations())) {
   const Cell spread = problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
   neighbours_ = NeighboursIn(problem, spread);
@@ -272,16 +269,9 @@ OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFla
     layer.box = OrientedBox(region, reach);
   }
   const int contact_units = static_cast<int>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)));
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(jobs.threads()));
-  std::mutex mutex;
-  std::int64_t done = 0;
-  tbb::parallel_for(std::size_t{0}, orientations.size(), [&](std::size_t k) {
-    Fill(flags, orientations[k], contact_units);
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (progress) progress(done, static_cast<std::int64_t>(orientations.size()));
-  });
+  ParallelFor(
+      orientations.size(), jobs, [&](std::size_t k) { Fill(flags, orientations[k], contact_units); }, progress,
+      cancellation);
 }
 
 void OrientedCertificates::Fill(const StepFlagsGrid& flags, int orientation, int contact_units) {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
 #include "feeler/planner/belief/problem.h"
@@ -30,11 +31,8 @@ struct OrientedBox {
 
   OrientedBox() = default;
   OrientedBox(const StepFlagsGrid::Region& region, const Cell& reach);
-  std::size_t Index(const Cell& displacement) const {
-    const Cell c = domain.Clamp(displacement) - domain.min;
-    return static_cast<std::size_t>((std::int64_t{c.z()} * size.y() + c.y()) * size.x() + c.x());
-  }
-  std::array<std::int64_t, 3> strides() const { return {1, size.x(), std::int64_t{size.x()} * size.y()}; }
+  std::size_t Index(const Cell& displacement) const { return GridIndex(size, domain.Clamp(displacement) - domain.min); }
+  std::array<std::int64_t, 3> strides() const { return GridStrides(size); }
   /// Cells of the way back to the box, where nothing can be told before.
   std::uint32_t WayBack(const Cell& displacement) const;
 };
@@ -53,9 +51,9 @@ class OrientedCertificates {
   static constexpr std::uint8_t kNone = 255;  ///< some neighbour cannot be told apart
   static constexpr std::uint8_t kMost = 254;
 
-  /// For the orientations, goal and axes of the hypotheses of `problem`.
+  /// For the orientations, goal and axes of the hypotheses of `problem`. Unusable after a cancellation.
   OrientedCertificates(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs, Parallelism jobs,
-                       const ProgressCallback& progress);
+                       const ProgressCallback& progress, const CancellationToken* cancellation = nullptr);
 
   const std::vector<OrientedNeighbour>& neighbours() const { return neighbours_; }
   /// Cost in problem units of a unit of the table.

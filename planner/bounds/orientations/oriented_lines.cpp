@@ -1,14 +1,11 @@
 #include "feeler/planner/bounds/orientations/oriented_lines.h"
 
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <mutex>
 #include <utility>
 
+#include "feeler/core/worker_pool.h"
 #include "feeler/planner/bounds/certificates/equal_steps.h"
 
 namespace feeler::planner {
@@ -20,23 +17,15 @@ constexpr std::uint32_t kUnitsPerStep = 16;  ///< where contacts cost something
 }  // namespace
 
 OrientedLines::OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
-                             Parallelism jobs, const ProgressCallback& progress)
+                             Parallelism jobs, const ProgressCallback& progress, const CancellationToken* cancellation)
     : units_per_step_(costs.contact > 0.0 ? kUnitsPerStep : 1) {
   std::vector<char> used(static_cast<std::size_t>(flags.orientations()), 0);
   for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
   for (const Axis axis : {kYaw, kPitch}) AddLines(axis, problem, flags, used);
   const double contact = costs.contact / costs.free * units_per_step_;
   const auto contact_units = static_cast<std::uint32_t>(std::min(4000.0, std::floor(contact + 1e-9)));
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    static_cast<std::size_t>(jobs.threads()));
-  std::mutex mutex;
-  std::int64_t done = 0;
-  tbb::parallel_for(std::size_t{0}, lines_.size(), [&](std::size_t i) {
-    Fill(flags, contact_units, lines_[i]);
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (progress) progress(done, static_cast<std::int64_t>(lines_.size()));
-  });
+  ParallelFor(
+      lines_.size(), jobs, [&](std::size_t i) { Fill(flags, contact_units, lines_[i]); }, progress, cancellation);
 }
 
 void OrientedLines::AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags,

@@ -30,9 +30,9 @@ class OrientedLines {
     int bit = 0;    ///< of the orientation in subsets of its line
   };
 
-  /// For the orientations that the hypotheses of `problem` have.
+  /// For the orientations that the hypotheses of `problem` have. Unusable after a cancellation.
   OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs, Parallelism jobs,
-                const ProgressCallback& progress);
+                const ProgressCallback& progress, const CancellationToken* cancellation = nullptr);
 
   /// Units of the tables per free step.
   std::uint32_t units_per_step() const { return units_per_step_; }

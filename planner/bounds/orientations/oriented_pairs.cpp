@@ -79,4 +79,9 @@ OrientedPairs::Plane OrientedPairs::Build(const Cell& offset, int orientation, i
   return plane;
 }
 
+std::size_t OrientedPairs::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
 }  // namespace feeler::planner

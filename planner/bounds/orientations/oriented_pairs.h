@@ -31,6 +31,8 @@ class OrientedPairs {
   /// Cost in problem units of a unit of the tables.
   double unit() const { return unit_; }
   std::shared_ptr<const Plane> Get(const Cell& offset, int orientation, int other) const;
+  /// Of the tables that are kept now.
+  std::size_t bytes() const;
 
  private:
   Plane Build(const Cell& offset, int orientation, int other) const;

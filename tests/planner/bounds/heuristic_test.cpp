@@ -1,7 +1,8 @@
 // Oracle: value iteration over all reachable beliefs (brute_force.h). Laws of every heuristic, on every reachable
 // belief of random small lattice problems with all kinds of costs, weights and goals: admissible, h <= V*; consistent,
-// h(b) <= C(b,a) + sum P h(b') for every action (cuboids promise only the first); zero at goals. On closed and open
-// plug maps canonical beliefs have the values of the same beliefs in problem coordinates.
+// h(b) <= C(b,a) + sum P h(b') for every action (cuboids promise only the first); zero at goals; of a stated tightness
+// on the mean. On closed and open plug maps canonical beliefs have the values of the same beliefs in problem
+// coordinates.
 
 #include <gtest/gtest.h>
 
@@ -23,6 +24,18 @@ std::vector<Hypothesis> Select(const Problem& problem, const std::vector<int>& m
   std::vector<Hypothesis> hypotheses;
   for (const int i : members) hypotheses.push_back(problem.hypotheses[static_cast<std::size_t>(i)]);
   return hypotheses;
+}
+
+/// Mean of h / V* that the bounds reach at least on these problems, whatever costs, weights and goal: what a bound is
+/// worth is a law of it too (zero is admissible and consistent). Four fifths of the least that was measured.
+double LeastTightness(HeuristicKind kind) {
+  switch (kind) {
+    case HeuristicKind::kCertificate: return 0.5;
+    case HeuristicKind::kCuboids: return 0.5;
+    case HeuristicKind::kLines: return 0.3;
+    case HeuristicKind::kFirstContact: return 0.1;
+  }
+  return 1.0;
 }
 
 class Heuristics : public ::testing::TestWithParam<std::tuple<HeuristicKind, int, bool>> {};
@@ -69,7 +82,11 @@ TEST_P(Heuristics, AdmissibleAndConsistent) {
       }
     }
   }
-  RecordProperty("mean_tightness", std::to_string(sum_of_ratios / beliefs));
+  const double tightness = sum_of_ratios / beliefs;
+  RecordProperty("mean_tightness", std::to_string(tightness));
+  // Lines are silent where the prior is not uniform.
+  const bool silent = heuristic_kind == HeuristicKind::kLines && options.weights;
+  EXPECT_GE(tightness, silent ? 0.0 : LeastTightness(heuristic_kind));
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Heuristics,

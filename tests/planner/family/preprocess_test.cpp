@@ -40,8 +40,22 @@ void ExpectSame(const MemorySink& a, const MemorySink& b) {
     EXPECT_EQ(result.expansions, other.expansions);
     ASSERT_EQ(result.policy->nodes.size(), other.policy->nodes.size());
     for (std::size_t i = 0; i < result.policy->nodes.size(); ++i) {
-      EXPECT_EQ(result.policy->nodes[i].move, other.policy->nodes[i].move);
-      EXPECT_EQ(result.policy->nodes[i].branches.size(), other.policy->nodes[i].branches.size());
+      const PolicyNode& one = result.policy->nodes[i];
+      const PolicyNode& two = other.policy->nodes[i];
+      EXPECT_EQ(one.move, two.move);
+      EXPECT_EQ(one.expected_cost, two.expected_cost);
+      ASSERT_EQ(one.branches.size(), two.branches.size());
+      for (std::size_t k = 0; k < one.branches.size(); ++k) {
+        EXPECT_EQ(one.branches[k].outcome, two.branches[k].outcome);
+        EXPECT_EQ(one.branches[k].next, two.branches[k].next);
+        EXPECT_EQ(one.branches[k].shift, two.branches[k].shift);
+        EXPECT_EQ(one.branches[k].probability, two.branches[k].probability);
+      }
+      ASSERT_EQ(one.leaf.size(), two.leaf.size());
+      for (std::size_t k = 0; k < one.leaf.size(); ++k) {
+        EXPECT_EQ(one.leaf[k].offset, two.leaf[k].offset);
+        EXPECT_EQ(one.leaf[k].orientation, two.leaf[k].orientation);
+      }
     }
   }
 }

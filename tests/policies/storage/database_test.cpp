@@ -313,9 +313,9 @@ TEST_F(DatabaseTest, NamesForeignAndUnknownVersions) {
   EXPECT_THAT(ErrorOf([&] { Database::OpenOrCreate(path(), Identity()); }), HasSubstr("another application"));
   std::filesystem::remove(path());
   { Database::Create(path(), Identity()); }
-  execute("PRAGMA user_version=3");
+  execute("PRAGMA user_version=4");
   EXPECT_THAT(reading(), HasSubstr("version 3"));
-  execute("PRAGMA user_version=2; ALTER TABLE problems RENAME COLUMN seed TO grain");
+  execute("PRAGMA user_version=3; ALTER TABLE problems RENAME COLUMN seed TO grain");
   EXPECT_THAT(reading(), HasSubstr("table problems"));
   execute(
       "ALTER TABLE problems RENAME COLUMN grain TO seed; CREATE TRIGGER t AFTER INSERT ON meta BEGIN SELECT 1; END");

@@ -129,6 +129,7 @@ TEST(OpenBound, IsTightForFewAndStandsForMany) {
   const auto open = testing::MakePlugMap(true, {10, 9, 12});
   SolverOptions options;
   options.expansion_limit = 1;
+  options.first_policy_in_any_case = true;
   const auto tables = BuildPlanningTables(MakeCuboidProblem(task, open, {2, 2, 2}), options);
   for (const auto& [extents, ratio] : {std::pair{Extents{3, 3, 2}, 1.1},
                                        {Extents{4, 4, 4}, 1.1},
@@ -159,6 +160,7 @@ TEST(OpenPolicy, ToursTheOpeningsWhereThatIsCheaper) {
   const auto open = testing::MakePlugMap(true);
   SolverOptions options;
   options.expansion_limit = 1;
+  options.first_policy_in_any_case = true;
   const SolverResult result = Solve(MakeCuboidProblem(task, open, {5, 5, 1}), options);
   ASSERT_TRUE(result.complete());
   EXPECT_LE(result.expected_cost, 12.0 + 12.0 + 1.0);

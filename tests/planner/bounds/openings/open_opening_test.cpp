@@ -40,6 +40,7 @@ TEST(OpenOpening, CostsNoMoreThanClosed) {
   const auto closed = testing::MakePlugMap(false, {10, 9, 12});
   SolverOptions options;
   options.expansion_limit = 500;
+  options.first_policy_in_any_case = true;
   const auto open_tables = BuildPlanningTables(MakeCuboidProblem(task, open, {2, 2, 2}), options);
   const auto closed_tables = BuildPlanningTables(MakeCuboidProblem(task, closed, {2, 2, 2}), options);
   for (const Extents& extents : {Extents{2, 2, 2}, Extents{3, 5, 2}, Extents{7, 6, 5}, Extents{15, 15, 15}}) {

@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "feeler/planner/policy/indistinguishable.h"
+#include "feeler/planner/search/bounded_search.h"
+#include "feeler/planner/search/greedy_completion.h"
+#include "feeler/planner/search/open_policy.h"
+#include "feeler/planner/search/random_judgement.h"
+#include "feeler/planner/solve_run.h"
+
+// The certified solver: a first policy, then BoundedSearch until the gap is closed or a limit holds.
+namespace feeler::planner {
+namespace {
+
+using Greedy = GreedyCompletion<BeliefGraph>;
+
+/// Up to so many hypotheses the greedy policy is tried beside the one for openings.
+constexpr std::uint32_t kGreedyBesideOpen = 256;
+/// Where hypotheses have orientations, which makes the heuristic loose: at most so many further greedy policies, and
+/// the inflation of the heuristic in the guess of BoundedSearch.
+constexpr std::uint64_t kFurtherPolicies = 120;
+constexpr double kGuessInflation = 1.3;
+
+bool Oriented(const SolveRun& run) { return run.graph.problem().map->orientations() > 1; }
+
+double BoundAtStart(const SolveRun& run) {
+  double bound = run.graph.Heuristic(run.start);
+  if (run.graph.problem().generous_workspace && run.tables.filled().bound) {
+    const SetId set = run.graph.set(run.start);
+    bound = std::max(bound, run.tables.filled().bound->Weighted(run.graph.sets(), set, run.graph.robot(run.start)));
+  }
+  return bound / run.weight;
+}
+
+/// By what the greedy policy judges beliefs, where that is not the heuristic itself.
+std::function<double(BeliefId)> EstimateOf(SolveRun& run) {
+  if (run.options.heuristic != HeuristicKind::kCuboids) return {};
+  return [&run](BeliefId b) { return run.heuristic->Estimate(run.graph.set(b), run.graph.robot(b)); };
+}
+
+/// The stop condition while there is no policy yet.
+std::function<std::optional<SolverStatus>(std::int64_t)> FirstPolicyStop(SolveRun& run) {
+  return [&run](std::int64_t expansions) {
+    const std::optional<SolverStatus> why = run.Stop(expansions);
+    const bool budget = why == SolverStatus::kTimeLimit || why == SolverStatus::kExpansionLimit;
+    return run.options.first_policy_in_any_case && budget ? std::nullopt : why;
+  };
+}
+
+/// The greedy policy. False, and says why in the result, if some hypotheses cannot be told apart or it was stopped.
+bool Complete(SolveRun& run, Greedy& greedy) {
+  const auto why = greedy.Run(run.start, FirstPolicyStop(run));
+  run.result.expansions = greedy.expansions();
+  if (!why) return true;
+  run.result.status = *why;
+  if (why == SolverStatus::kUnlocalizable) {
+    run.result.lower_bound = std::numeric_limits<double>::infinity();
+    run.result.indistinguishable = IndistinguishablePairs(run.graph.problem(), run.tables.masks());
+  }
+  return false;
+}
+
+/// Further policies while the gap is open, with up to half of the budget: with orientations the first may be far off.
+void Improve(SolveRun& run, Greedy& greedy) {
+  const auto stop = [&run](std::int64_t expansions) -> std::optional<SolverStatus> {
+    if (run.watch.expansions_before() + expansions >= run.options.expansion_limit / 2) {
+      return SolverStatus::kExpansionLimit;
+    }
+    return run.Stop(expansions);
+  };
+  for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
+    if (greedy.Value(run.start) <= run.options.gap * run.result.lower_bound * run.weight) return;
+    if (greedy.Run(run.start, stop, RandomJudgement(run.graph, run.options.seed, number))) return;
+  }
+}
+
+/// From the incumbent's policy until cost and lower bound meet within the gap.
+template <class Incumbent>
+void CloseGap(SolveRun& run, Incumbent& incumbent) {
+  SolverResult& result = run.result;
+  BoundedSearch search(run.graph, incumbent, run.options.gap, Oriented(run) ? kGuessInflation : 1.0);
+  const auto lower = [&] { return std::max(result.lower_bound, search.Lower(run.start) / run.weight); };
+  const auto why = search.Run(run.start, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+    const double upper = search.Upper(run.start) / run.weight;
+    if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
+    if (upper <= run.options.gap * lower()) return SolverStatus::kGap;
+    return run.Stop(expansions);
+  });
+  result.lower_bound = lower();
+  result.trials = search.trials();
+  result.expansions = search.expansions();
+  result.status = why.value_or(SolverStatus::kGap);
+  result.policy = run.Freeze(search);
+  if (result.policy->expected_cost <= result.lower_bound * (1.0 + 1e-9) + 1e-9) {
+    result.status = SolverStatus::kConverged;
+  }
+}
+
+/// The problem on the map whose dead ends are filled; none where there are none, or the tool is in one.
+std::optional<Problem> WithoutDeadEnds(const SolveRun& run) {
+  const Problem& problem = run.graph.problem();
+  if (!problem.generous_workspace || !run.tables.filled().bound) return std::nullopt;
+  Problem without = problem;
+  without.map = run.tables.filled().map;
+  for (const Hypothesis& h : problem.hypotheses) {
+    if (Blocked(without, problem.start, h)) return std::nullopt;
+  }
+  return without;
+}
+
+/// Dead ends make beliefs many and the greedy choice short-sighted (it looks into them one by one): the first policy is
+/// made from one for the map on which they are filled.
+void SolveWithOpenings(SolveRun& run, const Problem& filled, Greedy& greedy) {
+  const PlanningTables::Filled& tables = run.tables.filled();
+  BeliefGraph filled_graph(filled, tables.tables->masks(), run.graph.canonical());
+  const auto heuristic = tables.tables->MakeHeuristic(filled, filled_graph.sets());
+  filled_graph.SetHeuristic(heuristic.get());
+  OpenPolicy open(run.graph, filled_graph, *tables.bound, greedy);
+  const auto why = open.Run(run.start, FirstPolicyStop(run));
+  run.result.expansions = open.expansions();
+  const bool small = run.graph.sets().info(run.graph.set(run.start)).size <= kGreedyBesideOpen;
+  if (why && !open.Solved(run.start)) {
+    run.result.status = *why;
+    return;
+  }
+  if (small || !open.Solved(run.start)) Complete(run, greedy);
+  run.result.expansions = open.expansions();
+  if (open.Solved(run.start)) CloseGap(run, open);
+}
+
+}  // namespace
+
+void SolveCertified(SolveRun& run) {
+  run.result.lower_bound = BoundAtStart(run);
+  Greedy greedy(run.graph, EstimateOf(run));
+  if (const std::optional<Problem> filled = WithoutDeadEnds(run)) return SolveWithOpenings(run, *filled, greedy);
+  if (!Complete(run, greedy)) return;
+  if (Oriented(run)) Improve(run, greedy);
+  CloseGap(run, greedy);
+}
+
+}  // namespace feeler::planner
