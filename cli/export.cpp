@@ -1,9 +1,10 @@
 // feeler export: a lattice problem in the formats of other POMDP solvers.
-#include <iostream>
-#include <limits>
 #include <memory>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/planner/belief/lattice_problem.h"
@@ -17,21 +18,24 @@ struct Flags {
   std::string problem;
   std::string format = "pomdp";
   std::string out;
-  double upper_bound = std::numeric_limits<double>::infinity();
+  double upper_bound = 0.0;  ///< 0: not given
+  double discount = 1.0;
 };
 
 void Run(const Flags& flags) {
   if (flags.format != "pomdp" && flags.format != "pomdpx") {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
   }
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  RequireOutputs({{"--out", flags.out, flags.format == "pomdp" ? FileKind::kPomdp : FileKind::kPomdpx}},
+                 {flags.problem});
   const planner::Problem problem = planner::MakeLatticeProblem(policies::ReadLatticeProblem(flags.problem));
   policies::PomdpOptions options;
-  options.upper_bound = flags.upper_bound;
+  options.discount = flags.discount;
+  if (flags.upper_bound > 0.0) options.upper_bound = flags.upper_bound;
   const std::string text =
       flags.format == "pomdp" ? policies::FormatPomdp(problem, options) : policies::FormatPomdpx(problem, options);
   if (flags.out.empty()) {
-    std::cout << text;
+    PrintResult(text);
   } else {
     WriteFileAtomically(flags.out, text);
   }
@@ -46,9 +50,13 @@ void AddExportCommand(CLI::App& app, Session& /*session*/) {
   command->add_option("--format", flags->format, "pomdp (Cassandra's) or pomdpx (mixed observability)")
       ->capture_default_str();
   command->add_option("--out", flags->out, "file to write (default: standard output)");
-  command->add_option("--upper-bound", flags->upper_bound,
-                      "a proven upper bound of the optimal cost, such as a policy's: makes the penalty of a wrong "
-                      "declaration smaller (default: one worked out from the problem)");
+  AddReal(*command, "--upper-bound", flags->upper_bound, 1e-12, 1e12,
+          "a proven upper bound of the optimal cost, such as a policy's: makes the penalty of a wrong declaration "
+          "smaller, default: one worked out from the problem",
+          false);
+  AddReal(*command, "--discount", flags->discount, 0.5, 1.0,
+          "of the written model: 1 is the problem itself, solvers that need less than 1 find another value "
+          "(docs/file-formats.md)");
   command->callback([flags] { Run(*flags); });
 }
 

@@ -1,11 +1,9 @@
 #include "feeler/env/contact/contact_map_cache.h"
 
 #define XXH_INLINE_ALL
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
@@ -19,6 +17,7 @@
 #include <vector>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 #include "feeler/env/model/fingerprint.h"
 
 namespace feeler::env {
@@ -70,7 +69,7 @@ class Reader {
   }
   std::size_t left() const { return bytes_.size() - at_; }
   [[noreturn]] void Fail(const std::string& what) const {
-    throw InputError(file_.string(), "the contact map " + what, "delete the file; it will be built anew");
+    throw InputError(file_.string(), "the contact map " + what, "it is built anew when the task is used");
   }
 
  private:
@@ -89,7 +88,9 @@ fs::path CacheFolder() {
   if (const fs::path folder = variable("FEELER_CACHE_DIR"); !folder.empty()) return folder;
   if (const fs::path folder = variable("XDG_CACHE_HOME"); !folder.empty()) return folder / "feeler";
   if (const fs::path folder = variable("HOME"); !folder.empty()) return folder / ".cache" / "feeler";
-  return fs::temp_directory_path() / "feeler-cache";
+  std::error_code error;
+  const fs::path folder = fs::temp_directory_path(error);
+  return (error ? fs::path("/tmp") : folder) / "feeler-cache";
 }
 
 bool StoreContactMap(const fs::path& file, const ContactMap& map) {
@@ -109,24 +110,12 @@ bool StoreContactMap(const fs::path& file, const ContactMap& map) {
 
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
-  // The name differs between processes and between threads, so that two writers do not meet in one file.
-  static std::atomic<int> serial{0};
-  fs::path temporary = file;
-  temporary += "." + std::to_string(getpid()) + "." + std::to_string(serial++) + ".tmp";
-  {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(writer.bytes().data(), static_cast<std::streamsize>(writer.bytes().size()));
-    out.close();
-    if (!out) {
-      fs::remove(temporary, error);
-      return false;
-    }
+  try {
+    WriteFileAtomically(file.string(), {writer.bytes().data(), writer.bytes().size()});
+    return true;
+  } catch (const InputError&) {  // no room, no permission, or another process is at it: the map is built again
+    return false;
   }
-  fs::rename(temporary, file, error);
-  if (!error) return true;
-  std::error_code ignored;
-  fs::remove(temporary, ignored);
-  return false;
 }
 
 ContactMap ReadContactMap(const fs::path& file) {
@@ -136,7 +125,8 @@ ContactMap ReadContactMap(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::vector<char> bytes(error ? 0 : static_cast<std::size_t>(size));
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (error || !in) throw InputError(file.string(), "the contact map cannot be read");
+  if (error || !in)
+    throw InputError(file.string(), "the contact map cannot be read", "it is built anew when it is needed");
   Reader reader(bytes, file);
   std::array<char, kMagic.size()> magic{};
   reader.Get(magic.data(), magic.size());
