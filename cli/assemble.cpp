@@ -2,16 +2,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/evaluation/records/statistics.h"
 #include "feeler/workflow/assembly/assembly_builds.h"
 #include "feeler/workflow/assembly/assembly_video.h"
@@ -22,7 +26,7 @@ namespace {
 struct Flags {
   std::string assembly;
   std::vector<std::string> databases;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   std::int64_t builds = 1;
   int jobs = 1;
   std::string out;
@@ -35,16 +39,15 @@ struct Flags {
 };
 
 void RequireSane(const Flags& flags) {
-  if (flags.builds < 1) throw InputError("--builds", fmt::format("{}", flags.builds), "give 1 or more");
-  if (!(flags.video_speed >= 0.25 && flags.video_speed <= 50.0)) {
-    throw InputError("--video-speed", fmt::format("{} is out of range", flags.video_speed), "0.25 to 50");
-  }
   if (!flags.video.empty() && flags.builds > 1) {
     throw InputError("--video", "shows one build", "leave out --builds");
   }
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
-  if (!flags.video.empty()) RequireWritable("--video", flags.video);
-  if (!flags.render.empty()) RequireWritable("--render", flags.render);
+  std::vector<std::string> inputs = flags.databases;
+  inputs.push_back(flags.assembly);
+  RequireOutputs({{"--out", flags.out, FileKind::kRecords},
+                  {"--video", flags.video, FileKind::kMp4},
+                  {"--render", flags.render, FileKind::kPng}},
+                 inputs);
   if (!flags.check && flags.render.empty() && flags.databases.empty()) {
     throw InputError("--db", "missing", "give the database of each task (feeler preprocess), or --check");
   }
@@ -60,9 +63,9 @@ void PrintDrawing(const workflow::Assembly& assembly, const workflow::AssemblyPl
     const Eigen::Vector3d way = target.linear() * UnitVector(assembly.TaskOf(step).insertion);
     const Eigen::Vector3d p = part.translation();
     if (!json) {
-      fmt::print("{:>3}  {:<10} into {:<16} {:<18} along {:+.2f} {:+.2f} {:+.2f}, ends at {:.3f} {:.3f} {:.3f} m\n", i,
-                 assembly.Part(step.part).name, assembly.Part(step.into).name + "." + assembly.PortOf(step).name,
-                 step.task, way.x(), way.y(), way.z(), p.x(), p.y(), p.z());
+      Print("{:>3}  {:<10} into {:<16} {:<18} along {:+.2f} {:+.2f} {:+.2f}, ends at {:.3f} {:.3f} {:.3f} m\n", i,
+            assembly.Part(step.part).name, assembly.Part(step.into).name + "." + assembly.PortOf(step).name, step.task,
+            way.x(), way.y(), way.z(), p.x(), p.y(), p.z());
     }
     steps.push_back({{"part", assembly.Part(step.part).name},
                      {"into", assembly.Part(step.into).name},
@@ -74,7 +77,7 @@ void PrintDrawing(const workflow::Assembly& assembly, const workflow::AssemblyPl
   if (json) {
     PrintJson({{"assembly", assembly.name}, {"sound", true}, {"insertions", steps}});
   } else {
-    fmt::print("{}: {} insertions, sound\n", assembly.name, assembly.insertions.size());
+    Print("{}: {} insertions, sound\n", assembly.name, assembly.insertions.size());
   }
 }
 
@@ -111,27 +114,27 @@ void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
     PrintJson(json);
     return;
   }
-  fmt::print(
+  Print(
       "{}: {} of {} builds complete ({:.1f} % to {:.1f} %), {} of {} insertions, {} at the first attempt, {} with "
       "a fallback; {:.0f} s a build (median)\n",
       assembly.name, summary.complete, summary.builds, 100 * complete.low, 100 * complete.high, summary.inserted,
       summary.insertions, summary.first_attempt, summary.ladder_used, sim_time_s);
-  fmt::print("ports off the drawing by up to {:.2f} mm and {:.4f} rad; policies:", 1e3 * summary.largest_lateral_m,
-             summary.largest_angle_rad);
-  for (const auto& [source, count] : summary.policies) fmt::print(" {} {},", count, source);
-  fmt::print("\n");
+  Print("ports off the drawing by up to {:.2f} mm and {:.4f} rad; policies:", 1e3 * summary.largest_lateral_m,
+        summary.largest_angle_rad);
+  for (const auto& [source, count] : summary.policies) Print(" {} {},", count, source);
+  Print("\n");
   for (const workflow::AssemblyRecord& record : records) {
-    if (!record.complete) fmt::print("seed {}: {}\n", record.seed, record.reason);
+    if (!record.complete) Print("seed {}: {}\n", record.seed, record.reason);
   }
 }
 
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
-  const Parallelism jobs = ParseJobs(flags.jobs);
-  const std::uint64_t seed = ParseSeed(flags.seed);
+  const Parallelism jobs = Parallelism(flags.jobs);
+  const std::uint64_t seed = flags.seed;
   const workflow::Assembly assembly = workflow::LoadAssembly(flags.assembly);
   ProgressBar check_bar("checking");
-  const workflow::AssemblyPlan plan = workflow::CheckAssembly(assembly, check_bar.Callback());
+  const workflow::AssemblyPlan plan = workflow::CheckAssembly(assembly, Interruptible(check_bar, session));
   check_bar.Finish();
   if (!flags.render.empty()) env::WritePng(workflow::RenderAssembly(assembly, plan), flags.render);
   if (flags.check || (flags.databases.empty() && !flags.render.empty())) {
@@ -140,14 +143,11 @@ void Run(const Flags& flags, Session& session) {
   }
   ProgressBar map_bar("contact map");
   const workflow::AssemblyTasks tasks =
-      workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, map_bar.Callback());
+      workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session));
   map_bar.Finish();
 
-  std::ofstream out;
-  if (!flags.out.empty()) {
-    out.open(flags.out);
-    if (!out) throw InputError("--out", "cannot write " + flags.out, "choose another file");
-  }
+  std::optional<OutputFile> out;
+  if (!flags.out.empty()) out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
   workflow::AssemblyFilm film;
   film.period_s = flags.video_speed / 25.0;
   workflow::AssemblyOptions options;
@@ -160,17 +160,23 @@ void Run(const Flags& flags, Session& session) {
   const auto on_record = [&](const workflow::AssemblyRecord& record) {
     records.push_back(record);
     for (const auto& line : workflow::ToJsonLines(assembly, record)) {
-      if (out.is_open()) out << line.dump() << "\n";
+      if (out) out->Write(line.dump() + "\n");
     }
-    out.flush();
   };
-  workflow::BuildAssemblies(assembly, plan, tasks, options, static_cast<int>(flags.builds), jobs, on_record,
-                            bar.Callback());
+  try {
+    workflow::BuildAssemblies(assembly, plan, tasks, options, static_cast<int>(flags.builds), jobs, on_record,
+                              bar.Callback());
+  } catch (const InputError&) {  // of the output: what is there is cut off
+    throw;
+  } catch (...) {  // of the world or the machine: what is done is kept
+    if (out && !records.empty()) out->Commit();
+    throw;
+  }
   bar.Finish();
-  if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
+  if (out && !records.empty()) out->Commit();
   if (!flags.video.empty() && !records.empty()) {
     ProgressBar video_bar("video frames");
-    workflow::WriteAssemblyVideo(assembly, film, records.front(), flags.video, video_bar.Callback());
+    workflow::WriteAssemblyVideo(assembly, film, records.front(), flags.video, Interruptible(video_bar, session));
   }
   PrintSummary(flags, assembly, records);
   const bool one_stopped = flags.builds == 1 && !records.empty() && !records.front().complete;
@@ -188,13 +194,12 @@ void AddAssembleCommand(CLI::App& app, Session& session) {
                                fmt::join(workflow::ListAssemblies(), ", ")))
       ->required();
   command->add_option("--db", flags->databases, "policy database of a task (feeler preprocess); once for each task");
-  command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
-  command->add_option("--builds", flags->builds, "how many, with the seeds from --seed on")->capture_default_str();
-  command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();
+  AddSeed(*command, flags->seed, "of all draws");
+  AddInteger(*command, "--builds", flags->builds, 1, 1'000'000, "how many, with the seeds from --seed on");
+  AddJobs(*command, flags->jobs, "threads; the records do not depend on it");
   command->add_option("--out", flags->out, "records, one JSON object a line: each insertion, then the verdict");
   command->add_option("--video", flags->video, "MP4 of the build");
-  command->add_option("--video-speed", flags->video_speed, "how many times as fast as the robot")
-      ->capture_default_str();
+  AddReal(*command, "--video-speed", flags->video_speed, 0.25, 50.0, "how many times as fast as the robot");
   command->add_option("--render", flags->render, "PNG of the structure as drawn");
   command->add_flag("--check", flags->check, "check the assembly and print what is drawn; builds nothing");
   command->add_flag("--no-ladder", flags->no_ladder, "no fallbacks, and no second attempt");

@@ -5,11 +5,15 @@
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
 #include "feeler/cli/db_summary.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/policy_output.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/planner/policy/evaluate.h"
 #include "feeler/workflow/setup/bundle.h"
 #include "feeler/workflow/setup/database_builder.h"
@@ -47,7 +51,7 @@ workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags
   const policies::DatabaseIdentity& identity = database.identity();
   ProgressBar bar("contact map");
   workflow::PlanningSetupOptions options = workflow::SetupOptionsOf(identity);
-  options.jobs = ParseJobs(flags.jobs);
+  options.jobs = Parallelism(flags.jobs);
   options.progress = bar.Callback();
   workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task.empty() ? identity.task : flags.task, options);
   database.RequireFingerprint(setup.task().name, setup.fingerprint);
@@ -81,14 +85,14 @@ void Info(const Flags& flags) {
     PrintJson(json);
     return;
   }
-  fmt::print("task                {} ({})\n", identity.task, identity.fingerprint);
-  fmt::print("opening, goal       {}, {}\n", identity.opening, identity.goal);
-  fmt::print("settings            {}\n", identity.settings);
+  Print("task                {} ({})\n", identity.task, identity.fingerprint);
+  Print("opening, goal       {}, {}\n", identity.opening, identity.goal);
+  Print("settings            {}\n", identity.settings);
   const CostWeights& cost = identity.cost;
-  fmt::print("cost                {:g} a cell, {:g} a contact, {:g} a move, in {}\n", cost.per_cell, cost.per_contact,
-             cost.per_action, workflow::CostUnit(identity));
+  Print("cost                {:g} a cell, {:g} a contact, {:g} a move, in {}\n", cost.per_cell, cost.per_contact,
+        cost.per_action, workflow::CostUnit(identity));
   PrintInfo(database.Info(), workflow::CostUnit(identity));
-  fmt::print("content             {}\n", database.ContentDigest());
+  Print("content             {}\n", database.ContentDigest());
 }
 
 void List(const Flags& flags) {
@@ -100,12 +104,12 @@ void List(const Flags& flags) {
     PrintJson(json);
     return;
   }
-  fmt::print("{:<10} {:>10} {:<16} {:>13} {:>11} {:>7} {:>10} {:>9}\n", "extents", "hypotheses", "status",
-             "expected cost", "lower bound", "ratio", "expansions", "CPU s");
+  Print("{:<10} {:>10} {:<16} {:>13} {:>11} {:>7} {:>10} {:>9}\n", "extents", "hypotheses", "status", "expected cost",
+        "lower bound", "ratio", "expansions", "CPU s");
   for (const auto& p : problems) {
-    fmt::print("{:<10} {:>10} {:<16} {:>13.3f} {:>11.3f} {:>7.4f} {:>10} {:>9.4f}\n",
-               planner::ToString(p.extents, database.identity().axes), p.extents.Count(), p.status, p.expected_cost,
-               p.lower_bound, p.Ratio(), p.expansions, p.cpu_s);
+    Print("{:<10} {:>10} {:<16} {:>13.3f} {:>11.3f} {:>7.4f} {:>10} {:>9.4f}\n",
+          planner::ToString(p.extents, database.identity().axes), p.extents.Count(), p.status, p.expected_cost,
+          p.lower_bound, p.Ratio(), p.expansions, p.cpu_s);
   }
 }
 
@@ -127,7 +131,7 @@ void Show(const Flags& flags) {
     return;
   }
   for (const auto& [key, value] : json.items()) {
-    fmt::print("{:<18} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    Print("{:<18} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
   }
 }
 
@@ -136,7 +140,7 @@ void Verify(const Flags& flags, Session& session) {
   const workflow::PlanningSetup setup = SetupFor(database, flags);
   ProgressBar bar("replaying");
   const workflow::DatabaseVerification result =
-      workflow::VerifyDatabase(setup, database, ParseJobs(flags.jobs), bar.Callback(), session.cancellation);
+      workflow::VerifyDatabase(setup, database, Parallelism(flags.jobs), bar.Callback(), session.cancellation);
   bar.Finish();
   const bool cancelled = session.cancellation->cancelled();
   if (flags.json) {
@@ -148,11 +152,11 @@ void Verify(const Flags& flags, Session& session) {
                {"first_fault", result.first_fault},
                {"verified", result.faults == 0 && !cancelled}});
   } else {
-    fmt::print("{} of {} problems hold a policy; {} hypotheses replayed, largest cost error {:.2g}: {}\n",
-               result.policies, result.problems, result.hypotheses, result.largest_cost_error,
-               cancelled            ? "interrupted"
-               : result.faults == 0 ? "every policy localizes every hypothesis at the stored cost"
-                                    : fmt::format("{} faults, first: {}", result.faults, result.first_fault));
+    Print("{} of {} problems hold a policy; {} hypotheses replayed, largest cost error {:.2g}: {}\n", result.policies,
+          result.problems, result.hypotheses, result.largest_cost_error,
+          cancelled            ? "interrupted"
+          : result.faults == 0 ? "every policy localizes every hypothesis at the stored cost"
+                               : fmt::format("{} faults, first: {}", result.faults, result.first_fault));
   }
   if (result.faults > 0 || cancelled) session.exit_code = 1;
 }
@@ -161,7 +165,9 @@ void Export(const Flags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::StoredProblem stored = Find(database, flags);
   if (!stored.policy) throw NegativeResult(flags.file, flags.extents + " holds no complete policy");
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  std::vector<std::string> inputs = flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task);
+  inputs.push_back(flags.file);
+  RequireOutputs({{"--out", flags.out, FileKind::kPolicy}}, inputs);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
   const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
   WritePolicy(problem, *stored.policy, setup.task().name, flags.out);
@@ -194,7 +200,7 @@ void AddDbCommand(CLI::App& app, Session& session) {
   };
   const auto add_task = [](CLI::App* command, const std::shared_ptr<Flags>& flags) {
     command->add_option("--task", flags->task, "task file (default: the task the database names)");
-    command->add_option("--jobs", flags->jobs, "threads")->capture_default_str();
+    AddJobs(*command, flags->jobs, "threads");
   };
   {
     auto [command, flags] = add("info", "What it was made for; how many policies, how good, how large");

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feeler/cli/console.h"
+
 namespace feeler::cli {
 
 nlohmann::json InfoJson(const policies::DatabaseInfo& info) {
@@ -28,23 +30,22 @@ nlohmann::json InfoJson(const policies::DatabaseInfo& info) {
 }
 
 void PrintInfo(const policies::DatabaseInfo& info, const std::string& unit) {
-  fmt::print("problems            {}\n", info.problems);
-  fmt::print("solved              {}\n", info.solved);
-  for (const auto& [status, count] : info.statuses) fmt::print("  {:<18}{}\n", status, count);
-  fmt::print("expected cost, mean {:.2f} {}\n", info.expected_cost_mean, unit);
-  fmt::print("certified ratio     mean {:.4f}, max {:.4f}\n", info.ratio_mean, info.ratio_max);
+  Print("problems            {}\n", info.problems);
+  Print("solved              {}\n", info.solved);
+  for (const auto& [status, count] : info.statuses) Print("  {:<18}{}\n", status, count);
+  Print("expected cost, mean {:.2f} {}\n", info.expected_cost_mean, unit);
+  Print("certified ratio     mean {:.4f}, max {:.4f}\n", info.ratio_mean, info.ratio_max);
   std::int64_t largest = 1;
   for (const policies::RatioBin& bin : info.ratios) largest = std::max(largest, bin.count);
   double from = 1.0;
   for (const policies::RatioBin& bin : info.ratios) {
     const auto bar = static_cast<std::size_t>(40 * bin.count / largest);
-    if (bin.count > 0)
-      fmt::print("  {:>5.2f} - {:<5.2f} {:>6} {}\n", from, bin.up_to, bin.count, std::string(bar, '#'));
+    if (bin.count > 0) Print("  {:>5.2f} - {:<5.2f} {:>6} {}\n", from, bin.up_to, bin.count, std::string(bar, '#'));
     from = bin.up_to;
   }
-  fmt::print("policy nodes        {}\n", info.policy_nodes);
-  fmt::print("CPU time to build   {:.1f} s\n", info.cpu_s);
-  fmt::print("file                {:.2f} MB\n", static_cast<double>(info.bytes) / 1e6);
+  Print("policy nodes        {}\n", info.policy_nodes);
+  Print("CPU time to build   {:.1f} s\n", info.cpu_s);
+  Print("file                {:.2f} MB\n", static_cast<double>(info.bytes) / 1e6);
 }
 
 }  // namespace feeler::cli

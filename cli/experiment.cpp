@@ -3,12 +3,17 @@
 
 #include <filesystem>
 #include <memory>
+#include <system_error>
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/evaluation/registry.h"
 
 namespace feeler::cli {
@@ -20,14 +25,14 @@ struct Flags {
   bool list = false;
   bool quick = false;
   std::string task;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   int solver_seeds = 0;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
 void List() {
   for (const evaluation::Experiment& experiment : evaluation::Experiments()) {
-    fmt::print("{:<24} {}\n", experiment.name, experiment.summary);
+    Print("{:<24} {}\n", experiment.name, experiment.summary);
   }
 }
 
@@ -38,8 +43,15 @@ void Run(const Flags& flags, Session& session) {
   }
   const evaluation::Experiment& experiment = evaluation::FindExperiment(flags.name);
   if (flags.out.empty()) throw InputError("--out", "missing", "give a folder for the results");
-  if (std::filesystem::exists(flags.out) && !std::filesystem::is_directory(flags.out)) {
+  std::error_code error;
+  if (std::filesystem::exists(flags.out, error) && !std::filesystem::is_directory(flags.out, error)) {
     throw InputError("--out", flags.out + " is a file", "give a folder");
+  }
+
+  if (std::filesystem::is_directory(flags.out, error)) {
+    RequireOutputs({{"--out", flags.out + "/" + flags.name + ".json", FileKind::kExperiment},
+                    {"--out", flags.out + "/manifest.json", FileKind::kManifest}},
+                   flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task));
   }
 
   ProgressBar map_bar("contact map");
@@ -48,8 +60,8 @@ void Run(const Flags& flags, Session& session) {
   evaluation::ExperimentRequest request;
   request.out = flags.out;
   request.quick = flags.quick;
-  request.jobs = ParseJobs(flags.jobs);
-  request.seed = ParseSeed(flags.seed);
+  request.jobs = Parallelism(flags.jobs);
+  request.seed = flags.seed;
   request.task = flags.task;
   request.solver_seeds = flags.solver_seeds;
   request.command = fmt::format("feeler experiment {} --out {}{}{}{} --seed {} --jobs {}", flags.name, flags.out,
@@ -57,7 +69,7 @@ void Run(const Flags& flags, Session& session) {
                                 flags.solver_seeds > 0 ? fmt::format(" --solver-seeds {}", flags.solver_seeds) : "",
                                 flags.seed, request.jobs.threads());
   request.cancellation = session.cancellation;
-  request.map_progress = map_bar.Callback();
+  request.map_progress = Interruptible(map_bar, session);
   request.database_progress = database_bar.Callback();
   request.progress = bar.Callback();
   const evaluation::ExperimentOutcome outcome = evaluation::RunExperiment(experiment, request);
@@ -65,12 +77,11 @@ void Run(const Flags& flags, Session& session) {
   database_bar.Finish();
   bar.Finish();
   if (!outcome.complete) {
-    fmt::print(stderr, "interrupted: what is done is kept in {}; run the same command again to go on\n",
-               outcome.partial_file);
+    Note("interrupted: what is done is kept in {}; run the same command again to go on\n", outcome.partial_file);
     session.exit_code = 1;
     return;
   }
-  fmt::print("{}", outcome.text);
+  Print("{}", outcome.text);
 }
 
 }  // namespace
@@ -88,12 +99,12 @@ void AddExperimentCommand(CLI::App& app, Session& session) {
   command->add_option("--task", flags->task,
                       "name under models/tasks/, or path of a task file, for the experiments on planning (default: "
                       "plug)");
-  command->add_option("--solver-seeds", flags->solver_seeds,
-                      "repetitions of each attempt of a table (default: 3; 1 with --quick); more may be added to a "
-                      "finished folder");
-  command->add_option("--seed", flags->seed, "of the sample and the first of the solver seeds")->capture_default_str();
-  command->add_option("--jobs", flags->jobs, "threads; more than the cores would spoil the measured times")
-      ->capture_default_str();
+  AddInteger(*command, "--solver-seeds", flags->solver_seeds, 1, 1000,
+             "repetitions of each attempt of a table (default: 3; 1 with --quick); more may be added to a "
+             "finished folder",
+             false);
+  AddSeed(*command, flags->seed, "of the sample and the first of the solver seeds");
+  AddJobs(*command, flags->jobs, "threads; more than the cores would spoil the measured times");
   command->callback([flags, &session] { Run(*flags, session); });
 }
 

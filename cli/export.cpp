@@ -1,10 +1,11 @@
 // feeler export: a lattice problem in the formats of other POMDP solvers.
 #include <cstdio>
-#include <iostream>
-#include <limits>
 #include <memory>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
@@ -20,15 +21,16 @@ namespace {
 struct Flags {
   std::string problem;
   std::string rock_sample;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   std::string format = "pomdp";
   std::string out;
-  double upper_bound = std::numeric_limits<double>::infinity();
+  double upper_bound = 0.0;  ///< 0: not given
+  double discount = 1.0;
 };
 
 void Write(const Flags& flags, const std::string& text) {
   if (flags.out.empty()) {
-    std::cout << text;
+    PrintResult(text);
   } else {
     WriteFileAtomically(flags.out, text);
   }
@@ -43,22 +45,23 @@ std::string RockSampleText(const Flags& flags) {
   if (std::sscanf(flags.rock_sample.c_str(), "%4dx%4d%c", &size, &rocks, &rest) != 2) {
     throw InputError("--rock-sample", "\"" + flags.rock_sample + "\"", "give size and rocks, e.g. 7x8");
   }
-  return planner::FormatCassandraPomdp(
-      planner::MakeRockSample(planner::DrawRockSample(size, rocks, ParseSeed(flags.seed))));
+  return planner::FormatCassandraPomdp(planner::MakeRockSample(planner::DrawRockSample(size, rocks, flags.seed)));
 }
 
 void Run(const Flags& flags) {
   if (flags.format != "pomdp" && flags.format != "pomdpx") {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
   }
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  RequireOutputs({{"--out", flags.out, flags.format == "pomdp" ? FileKind::kPomdp : FileKind::kPomdpx}},
+                 {flags.problem});
   if (flags.problem.empty() == flags.rock_sample.empty()) {
     throw InputError("export", "give either --problem or --rock-sample", "see feeler export --help");
   }
   if (!flags.rock_sample.empty()) return Write(flags, RockSampleText(flags));
   const planner::Problem problem = planner::MakeLatticeProblem(policies::ReadLatticeProblem(flags.problem));
   policies::PomdpOptions options;
-  options.upper_bound = flags.upper_bound;
+  options.discount = flags.discount;
+  if (flags.upper_bound > 0.0) options.upper_bound = flags.upper_bound;
   const std::string text =
       flags.format == "pomdp" ? policies::FormatPomdp(problem, options) : policies::FormatPomdpx(problem, options);
   Write(flags, text);
@@ -72,13 +75,17 @@ void AddExportCommand(CLI::App& app, Session& /*session*/) {
   command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
   command->add_option("--rock-sample", flags->rock_sample,
                       "write a RockSample benchmark instead, e.g. 7x8: 7 x 7 cells, 8 rocks drawn from the seed");
-  command->add_option("--seed", flags->seed, "of the rocks")->capture_default_str();
+  AddSeed(*command, flags->seed, "of the rocks");
   command->add_option("--format", flags->format, "pomdp (Cassandra's) or pomdpx (mixed observability)")
       ->capture_default_str();
   command->add_option("--out", flags->out, "file to write (default: standard output)");
-  command->add_option("--upper-bound", flags->upper_bound,
-                      "a proven upper bound of the optimal cost, such as a policy's: makes the penalty of a wrong "
-                      "declaration smaller (default: one worked out from the problem)");
+  AddReal(*command, "--upper-bound", flags->upper_bound, 1e-12, 1e12,
+          "a proven upper bound of the optimal cost, such as a policy's: makes the penalty of a wrong declaration "
+          "smaller, default: one worked out from the problem",
+          false);
+  AddReal(*command, "--discount", flags->discount, 0.5, 1.0,
+          "of the written model: 1 is the problem itself, solvers that need less than 1 find another value "
+          "(docs/file-formats.md)");
   command->callback([flags] { Run(*flags); });
 }
 

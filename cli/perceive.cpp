@@ -8,9 +8,14 @@
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/perception/cloud_file.h"
@@ -39,7 +44,7 @@ struct CalibrateFlags {
   int poses = 1000;
   int installations = 5;
   int frames = 10;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
 };
@@ -101,8 +106,8 @@ void Perceive(const Flags& flags) {
   const std::vector<int> counts = workflow::AxisExtents(task, *extents);
   if (!flags.json) {
     const Eigen::Vector3d& p = hypotheses.world_T_estimate.translation();
-    fmt::print("target at {:.4f} {:.4f} {:.4f} m, fitness {:.2f}; {} hypotheses ({})\n", p.x(), p.y(), p.z(),
-               found.fitness, extents->Count(), planner::ToString(*extents));
+    Print("target at {:.4f} {:.4f} {:.4f} m, fitness {:.2f}; {} hypotheses ({})\n", p.x(), p.y(), p.z(), found.fitness,
+          extents->Count(), planner::ToString(*extents));
     return;
   }
   nlohmann::ordered_json json;
@@ -129,7 +134,7 @@ void Perceive(const Flags& flags) {
     const Eigen::VectorXd values = found.covariance.row(row);
     json["covariance"].push_back(std::vector<double>(values.data(), values.data() + values.size()));
   }
-  fmt::print("{}\n", json.dump(2));
+  Print("{}\n", json.dump(2));
 }
 
 std::string CoverageLine(const char* name, const perception::TableScore& score) {
@@ -149,26 +154,26 @@ void Calibrate(const CalibrateFlags& flags, Session& session) {
   workflow::CalibrationOptions options;
   options.poses = flags.poses;
   options.installations = flags.installations;
-  options.seed = ParseSeed(flags.seed);
-  options.jobs = ParseJobs(flags.jobs);
+  options.seed = flags.seed;
+  options.jobs = Parallelism(flags.jobs);
   options.perception.averaged_frames = flags.frames;
-  options.partial = flags.out + ".partial.jsonl";
+  if (IsReplaceable(flags.out)) options.partial = flags.out + ".partial.jsonl";
   options.cancellation = session.cancellation;
   options.Validate();
-  RequireWritable("--out", flags.out);
+  RequireOutputs({{"--out", flags.out, FileKind::kTable}}, InputsOfTask(flags.task));
   const env::TaskModel model = env::LoadTask(flags.task);
   ProgressBar bar("poses");
   options.progress = bar.Callback();
   const workflow::Calibration calibration = workflow::Calibrate(model, options);
   bar.Finish();
   if (!calibration.complete) {
-    fmt::print(stderr, "interrupted after {} of {} poses; run the same command again to go on\n",
-               calibration.samples.size(), 2 * flags.poses);
+    Note("interrupted after {} of {} poses; run the same command again to go on\n", calibration.samples.size(),
+         2 * flags.poses);
     session.exit_code = 1;
     return;
   }
   const std::string report = workflow::ReportJson(calibration, options);
-  perception::WriteFile(flags.out, perception::ToJson(calibration.table, report));
+  WriteFileAtomically(flags.out, perception::ToJson(calibration.table, report));
   if (flags.json) {
     PrintJson(nlohmann::json::parse(report));
     return;
@@ -181,7 +186,7 @@ void Calibrate(const CalibrateFlags& flags, Session& session) {
   text += ErrorLine("the same without bias", workflow::SummarizeErrors(calibration, true));
   text += CoverageLine("truth within hypotheses, held out", calibration.held_out);
   text += CoverageLine("without bias correction (paper)", calibration.held_out_plain);
-  fmt::print("{}", text);
+  Print("{}", text);
 }
 
 }  // namespace
@@ -206,12 +211,12 @@ void AddPerceiveCommand(CLI::App& app, Session& session) {
       command->add_subcommand("calibrate", "Make the uncertainty table of a task from simulated captures");
   nested->add_option("--task", calibrate->task, "name under models/tasks/, or path of a task file")->required();
   nested->add_option("--out", calibrate->out, "table file (JSON)")->required();
-  nested->add_option("--poses", calibrate->poses, "to make it from; as many others judge it")->capture_default_str();
-  nested->add_option("--installations", calibrate->installations, "of the camera; as many others judge it")
-      ->capture_default_str();
-  nested->add_option("--frames", calibrate->frames, "averaged for a picture")->capture_default_str();
-  nested->add_option("--seed", calibrate->seed, "of all draws")->capture_default_str();
-  nested->add_option("--jobs", calibrate->jobs, "threads; the table does not depend on it")->capture_default_str();
+  AddInteger(*nested, "--poses", calibrate->poses, 1, 1000000, "to make it from; as many others judge it");
+  AddInteger(*nested, "--installations", calibrate->installations, 1, 1000000,
+             "of the camera; as many others judge it");
+  AddInteger(*nested, "--frames", calibrate->frames, 1, 1000, "averaged for a picture");
+  AddSeed(*nested, calibrate->seed, "of all draws");
+  AddJobs(*nested, calibrate->jobs, "threads; the table does not depend on it");
   nested->add_flag("--json", calibrate->json, "print the report as JSON");
   nested->callback([calibrate, &session] { Calibrate(*calibrate, session); });
   command->callback([flags, command] {

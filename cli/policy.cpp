@@ -1,17 +1,20 @@
 // feeler policy: look at one policy.
 #include <fmt/format.h>
 
-#include <iostream>
 #include <limits>
 #include <memory>
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/pomdp.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/planner/belief/lattice_problem.h"
 #include "feeler/planner/policy/expand_policy.h"
 #include "feeler/policies/io/lattice_problem_file.h"
@@ -41,7 +44,7 @@ struct Flags {
 planner::Problem TaskProblem(const Flags& flags, const std::string& task, workflow::PlanningSetupOptions options,
                              const policies::Database* database) {
   ProgressBar bar("contact map");
-  options.jobs = ParseJobs(flags.jobs);
+  options.jobs = Parallelism(flags.jobs);
   options.progress = bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(task, options);
   if (database != nullptr) database->RequireFingerprint(setup.task().name, setup.fingerprint);
@@ -100,7 +103,9 @@ void Graph(const Flags& flags) {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of dot, html");
   }
   RequireOneSource(flags);
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
+  std::vector<std::string> inputs = flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task);
+  inputs.insert(inputs.end(), {flags.policy, flags.problem, flags.db});
+  RequireOutputs({{"--out", flags.out, flags.format == "dot" ? FileKind::kGraphDot : FileKind::kGraphHtml}}, inputs);
   policies::PolicyDrawingOptions options;
   options.max_depth = flags.max_depth;
   options.min_probability = flags.min_probability;
@@ -109,7 +114,7 @@ void Graph(const Flags& flags) {
   const std::string text = flags.format == "dot" ? policies::FormatPolicyDot(policy, title, options)
                                                  : policies::FormatPolicyHtml(policy, title, options);
   if (flags.out.empty()) {
-    std::cout << text;
+    PrintResult(text);
   } else {
     WriteFileAtomically(flags.out, text);
   }
@@ -132,11 +137,11 @@ void AddPolicyCommand(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
   command->add_option("--format", flags->format, "html (one page) or dot (Graphviz)")->capture_default_str();
-  command->add_option("--max-depth", flags->max_depth, "draw this many moves from the root (default: all)");
-  command->add_option("--min-probability", flags->min_probability, "leave out nodes reached more rarely, 0..1")
-      ->capture_default_str();
+  AddInteger(*command, "--max-depth", flags->max_depth, 0, std::numeric_limits<int>::max(),
+             "draw this many moves from the root, default: all", false);
+  AddReal(*command, "--min-probability", flags->min_probability, 0.0, 1.0, "leave out nodes reached more rarely");
   command->add_option("--out", flags->out, "file to write (default: standard output)");
-  command->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
+  AddJobs(*command, flags->jobs, "threads, if the contact map must be built");
   command->callback([flags] { Graph(*flags); });
 }
 

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <memory>
 
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
@@ -45,7 +48,7 @@ planner::PomdpSolverOptions Options(const CLI::App& command, const PomdpFlags& f
   options.precision = flags.precision;
   options.levels = flags.levels;
   options.simulate = flags.simulate;
-  options.seed = ParseSeed(solver.seed);
+  options.seed = solver.seed;
   if (command.count("--epsilon") > 0) options.epsilon = solver.epsilon;
   if (command.count("--time-limit") > 0) options.time_limit_s = solver.time_limit_s;
   if (command.count("--expansion-limit") > 0) options.expansion_limit = solver.expansion_limit;
@@ -83,8 +86,8 @@ nlohmann::json SimulationJson(const planner::SimulationResult& s) {
 }
 
 void PrintSimulation(const planner::SimulationResult& s) {
-  fmt::print("episodes       {}\nmean reward    {:.6g} +- {:.2g} (95 %)\nsteps          {:.1f}\nat a goal      {}\n",
-             s.episodes, s.mean, s.half_width, s.steps_mean, s.at_goal);
+  Print("episodes       {}\nmean reward    {:.6g} +- {:.2g} (95 %)\nsteps          {:.1f}\nat a goal      {}\n",
+        s.episodes, s.mean, s.half_width, s.steps_mean, s.at_goal);
 }
 
 std::string Extension(const std::string& path) {
@@ -97,7 +100,7 @@ struct SimulateFlags {
   std::string policy;
   int episodes = 10000;
   int max_steps = 0;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   bool json = false;
 };
 
@@ -125,7 +128,7 @@ void RunSimulate(const SimulateFlags& flags, Session& session) {
   planner::SimulationOptions options;
   options.episodes = flags.episodes;
   options.max_steps = flags.max_steps;
-  options.seed = ParseSeed(flags.seed);
+  options.seed = flags.seed;
   options.cancellation = session.cancellation;
   options.progress = bar.Callback();
   const planner::SimulationResult result = planner::SimulatePomdp(pomdp, *agent, options);
@@ -168,7 +171,7 @@ void RequireNoPomdpFlags(const CLI::App& command) {
 
 void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const SolverFlags& solver, const std::string& out,
                    bool json, Session& session) {
-  if (!out.empty()) RequireWritable("--out", out);
+  RequireOutputs({{"--out", out, FileKind::kPomdpPolicy}}, {flags.pomdp, flags.experience});
   const planner::Pomdp pomdp = planner::ReadPomdp(flags.pomdp);
   planner::PomdpSolverOptions options = Options(command, flags, solver, pomdp);
   options.cancellation = session.cancellation;
@@ -180,12 +183,12 @@ void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const Solve
   bool header = false;
   options.on_bounds = [&header](const planner::ValueBounds& row) {
     if (!header) {
-      fmt::print(stderr, "{:>9} {:>9} {:>12} {:>14} {:>14} {:>12}\n", "time s", "trials", "expansions", "value lower",
-                 "value upper", "width");
+      Note("{:>9} {:>9} {:>12} {:>14} {:>14} {:>12}\n", "time s", "trials", "expansions", "value lower", "value upper",
+           "width");
       header = true;
     }
-    fmt::print(stderr, "{:>9.3f} {:>9} {:>12} {:>14.5f} {:>14.5f} {:>12.5f}\n", row.wall_s, row.trials, row.expansions,
-               row.lower, row.upper, row.upper - row.lower);
+    Note("{:>9.3f} {:>9} {:>12} {:>14.5f} {:>14.5f} {:>12.5f}\n", row.wall_s, row.trials, row.expansions, row.lower,
+         row.upper, row.upper - row.lower);
   };
   const planner::PomdpResult result = planner::SolvePomdp(pomdp, options);
   if (!out.empty() && result.controller) WritePomdpPolicy(pomdp, result, out);
@@ -210,11 +213,9 @@ void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const Solve
     if (result.simulated) document["simulated"] = SimulationJson(*result.simulated);
     PrintJson(document);
   } else {
-    fmt::print("status         {}\nvalue          {:.6g} to {:.6g}\npolicy nodes   {}\n",
-               planner::ToString(result.status), result.value_lower, result.value_upper,
-               result.controller ? result.controller->nodes.size() : 0);
-    fmt::print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s,
-               result.wall_s);
+    Print("status         {}\nvalue          {:.6g} to {:.6g}\npolicy nodes   {}\n", planner::ToString(result.status),
+          result.value_lower, result.value_upper, result.controller ? result.controller->nodes.size() : 0);
+    Print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s, result.wall_s);
     if (result.simulated) PrintSimulation(*result.simulated);
   }
   if (!result.controller) session.exit_code = 1;
@@ -229,12 +230,12 @@ void AddPolicySimulateCommand(CLI::App& policy, Session& session) {
       ->add_option("--policy", flags->policy,
                    "what feeler solve --pomdp --out wrote: .json (graph), .alpha or .policyx")
       ->required();
-  command->add_option("--episodes", flags->episodes, "how many")->capture_default_str();
+  AddInteger(*command, "--episodes", flags->episodes, 1, 100000000, "how many");
   command
       ->add_option("--max-steps", flags->max_steps,
                    "steps of an episode at most (0: until a goal, or until the discount leaves a millionth)")
       ->capture_default_str();
-  command->add_option("--seed", flags->seed, "of the episodes")->capture_default_str();
+  AddSeed(*command, flags->seed, "of the episodes");
   command->add_flag("--json", flags->json, "print the result as JSON");
   command->callback([flags, &session] { RunSimulate(*flags, session); });
 }

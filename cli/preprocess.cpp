@@ -5,10 +5,14 @@
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
 #include "feeler/cli/db_summary.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/policies/io/problem_family_file.h"
 #include "feeler/workflow/perception/perceive_table.h"
@@ -45,7 +49,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   planner::PreprocessOptions options;
   options.solver = flags.solver.Options(command);
   options.seed = options.solver.seed;
-  options.jobs = ParseJobs(flags.jobs);
+  options.jobs = Parallelism(flags.jobs);
   options.cancellation = session.cancellation;
   if (flags.order == "random") {
     options.order = planner::ProblemOrder::kRandom;
@@ -53,30 +57,32 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     throw InputError("--order", "unknown value \"" + flags.order + "\"", "choose one of uncertainty, random");
   }
   options.experience = ParseExperience(flags.experience);
-  RequireWritable("--out", flags.out);
+  std::vector<std::string> inputs = InputsOfTask(flags.task);
+  inputs.push_back(flags.family);
+  RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, inputs);
 
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
   setup_options.opening = ParseOpening(flags.opening);
   setup_options.cost_kind = ParseCost(flags.cost);
   setup_options.jobs = options.jobs;
-  setup_options.progress = map_bar.Callback();
+  setup_options.progress = Interruptible(map_bar, session);
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
   map_bar.Finish();
   const planner::ProblemFamily family = FamilyFor(flags.family, setup);
   workflow::RequireWithinTask(family, setup.task());
 
   ProgressBar table_bar("tables");
-  options.solver.on_tables = table_bar.Callback();
+  options.solver.on_tables = Interruptible(table_bar, session);
   ProgressBar bar("problems");
   options.progress = bar.Callback();
   const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out);
   bar.Finish();
 
   const planner::PreprocessSummary& summary = build.summary;
-  fmt::print(stderr, "{} problems: {} solved now, {} already there, {} failed; {:.1f} s wall, {:.1f} s CPU{}\n",
-             summary.problems, summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
-             summary.cancelled ? "; interrupted, run the same command again to go on" : "");
+  Note("{} problems: {} solved now, {} already there, {} failed; {:.1f} s wall, {:.1f} s CPU{}\n", summary.problems,
+       summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
+       summary.cancelled ? "; interrupted, run the same command again to go on" : "");
   if (flags.json) {
     nlohmann::json json = InfoJson(build.info);
     json["cost_unit"] = workflow::CostUnit(setup.cost_kind, setup.task().cost);
@@ -103,7 +109,7 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--order", flags->order, "uncertainty or random (e-rtdp-bel)")->capture_default_str();
   command->add_option("--experience", flags->experience, "rollout, naive or none (e-rtdp-bel)")->capture_default_str();
-  command->add_option("--jobs", flags->jobs, "threads; the content does not depend on it")->capture_default_str();
+  AddJobs(*command, flags->jobs, "threads; the content does not depend on it");
   command->add_flag("--json", flags->json, "print the summary as JSON");
   flags->solver.AddTo(*command);
   command->callback([command, flags, &session] { Run(*command, *flags, session); });

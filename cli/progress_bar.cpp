@@ -4,19 +4,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
+
+#include "feeler/cli/console.h"
 
 namespace feeler::cli {
 namespace {
 constexpr int kWidth = 30;
 constexpr auto kRedrawInterval = std::chrono::milliseconds(100);
 
-/// A reader that has gone away must not end the work: errors of writing are ignored.
-void Show(const std::string& text) {
-  std::fputs(text.c_str(), stderr);
-  std::fflush(stderr);
-}
 }  // namespace
 
 ProgressBar::ProgressBar(std::string label)
@@ -33,20 +29,20 @@ void ProgressBar::Update(std::int64_t done, std::int64_t total) {
   if (terminal_) {
     if (drawn_ && done < total && now - last_draw_ < kRedrawInterval) return;
     const int filled = static_cast<int>(fraction * kWidth);
-    Show(fmt::format("\r{} [{}{}] {}/{}  {:.0f} s, {:.0f} s left \033[K", label_, std::string(filled, '#'),
+    Tell(fmt::format("\r{} [{}{}] {}/{}  {:.0f} s, {:.0f} s left \033[K", label_, std::string(filled, '#'),
                      std::string(kWidth - filled, '.'), done, total, elapsed_s, left_s));
   } else {
     const std::int64_t tenth = static_cast<std::int64_t>(fraction * 10);
     if (tenth == last_tenth_) return;
     last_tenth_ = tenth;
-    Show(fmt::format("{}: {}/{}  {:.0f} s\n", label_, done, total, elapsed_s));
+    Tell(fmt::format("{}: {}/{}  {:.0f} s\n", label_, done, total, elapsed_s));
   }
   drawn_ = true;
   last_draw_ = now;
 }
 
 void ProgressBar::Finish() {
-  if (drawn_ && terminal_) Show("\n");
+  if (drawn_ && terminal_) Tell("\n");
   drawn_ = false;
 }
 

@@ -4,10 +4,15 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/printable.h"
 #include "feeler/evaluation/report/page.h"
 
 namespace feeler::cli {
@@ -22,13 +27,10 @@ struct Flags {
 
 void Run(const Flags& flags, Session& session) {
   (void)session;
-  RequireWritable("--out", flags.out);
-  if (!(flags.replay_megabytes >= 0.0 && flags.replay_megabytes <= 1000.0)) {
-    throw InputError("--replay-megabytes", "out of range", "give 0 to 1000");
-  }
+  RequireOutputs({{"--out", flags.out, FileKind::kReport}}, {});  // what it reads is not of that kind
   const evaluation::Results results = evaluation::ReadResults(flags.folder);
   for (const evaluation::Fault& fault : results.faults) {
-    fmt::print(stderr, "feeler: warning: {}\n", evaluation::ToString(fault));
+    Note("feeler: warning: {}\n", Printable(evaluation::ToString(fault)));
   }
   evaluation::ReportOptions options;
   options.replay_bytes = std::llround(1e6 * flags.replay_megabytes);
@@ -37,7 +39,9 @@ void Run(const Flags& flags, Session& session) {
 
   std::size_t episodes = 0;
   for (const evaluation::ReportedRecords& records : results.records) episodes += records.episodes.size();
-  const std::string path = std::filesystem::absolute(flags.out).lexically_normal().string();
+  std::error_code error;  // without a current folder the name stays as given
+  const std::filesystem::path absolute = std::filesystem::absolute(flags.out, error);
+  const std::string path = error ? flags.out : absolute.lexically_normal().string();
   if (flags.json) {
     PrintJson({{"experiments", results.experiments.size()},
                {"episodes", episodes},
@@ -46,8 +50,8 @@ void Run(const Flags& flags, Session& session) {
                {"path", path}});
     return;
   }
-  fmt::print("{} experiments, {} episodes, {} faults, {:.1f} MB\n{}\n", results.experiments.size(), episodes,
-             results.faults.size(), 1e-6 * static_cast<double>(page.size()), path);
+  Print("{} experiments, {} episodes, {} faults, {:.1f} MB\n{}\n", results.experiments.size(), episodes,
+        results.faults.size(), 1e-6 * static_cast<double>(page.size()), path);
 }
 
 }  // namespace
@@ -58,10 +62,8 @@ void AddReportCommand(CLI::App& app, Session& session) {
   command->add_option("dir", flags->folder, "folder of results (feeler experiment --out) or records (feeler run --out)")
       ->required();
   command->add_option("--out", flags->out, "the page to write, e.g. report.html")->required();
-  command
-      ->add_option("--replay-megabytes", flags->replay_megabytes,
-                   "how much of the page replays may take; failures come first")
-      ->capture_default_str();
+  AddReal(*command, "--replay-megabytes", flags->replay_megabytes, 0.0, 1000.0,
+          "how much of the page replays may take; failures come first");
   command->add_flag("--json", flags->json, "print what was reported as JSON");
   command->callback([flags, &session] { Run(*flags, session); });
 }

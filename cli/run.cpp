@@ -3,17 +3,22 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <thread>
 #include <vector>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/evaluation/records/episode_json.h"
@@ -28,6 +33,9 @@
 namespace feeler::cli {
 namespace {
 
+/// Memory for their rows, some 1 kB each, is what bounds them.
+constexpr std::int64_t kMostEpisodes = 10'000'000;
+
 struct Flags {
   std::string task;
   std::string db;
@@ -41,11 +49,11 @@ struct Flags {
   std::string out;
   std::string video;
   std::int64_t episodes = 1;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
   std::string versus;
   std::int64_t video_episode = 0;
   int jobs = 1;
-  std::optional<double> confirm_limit_m;
+  double confirm_limit_m = 0.0;  ///< 0: not given
   bool no_ladder = false;
   bool withhold_true_pose = false;
   bool json = false;
@@ -58,11 +66,13 @@ std::string NoiseHelp() {
   return help;
 }
 
+std::vector<std::string> Inputs(const Flags& flags) {
+  std::vector<std::string> inputs = InputsOfTask(flags.task);
+  inputs.insert(inputs.end(), {flags.db, flags.table});
+  return inputs;
+}
+
 void RequireSane(const Flags& flags) {
-  if (flags.episodes < 1) {
-    throw InputError("--episodes", std::to_string(flags.episodes) + " episodes", "give a number of at least 1");
-  }
-  if (flags.video_episode < 0) throw InputError("--video-episode", "negative", "give a number of at least 0");
   if (!flags.perception.empty() && flags.perception != "icp") {
     throw InputError("--perception", "unknown name \"" + flags.perception + "\"", "choose icp");
   }
@@ -73,8 +83,7 @@ void RequireSane(const Flags& flags) {
   if (!flags.perception.empty() && !flags.extents.empty()) {
     throw InputError("--extents", "the camera decides on the problem", "leave out --extents or --perception");
   }
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
-  if (!flags.video.empty()) RequireWritable("--video", flags.video);
+  RequireOutputs({{"--out", flags.out, FileKind::kRecords}, {"--video", flags.video, FileKind::kMp4}}, Inputs(flags));
   if (!flags.versus.empty() && flags.video.empty()) {
     throw InputError("--versus", "is about the video, and there is none", "add --video FILE.mp4");
   }
@@ -110,25 +119,25 @@ std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::stri
 }
 
 /// Films --video-episode, with --versus a second time under that policy.
-void WriteVideo(const Flags& flags, const std::function<workflow::EpisodeRunner()>& make_runner,
+void WriteVideo(const Flags& flags, const Session& session, const std::function<workflow::EpisodeRunner()>& make_runner,
                 const std::function<workflow::EpisodeRunner()>& make_versus) {
   ProgressBar bar("video frames");
   const auto episode = static_cast<std::uint64_t>(flags.video_episode);
   workflow::EpisodeRunner runner = make_runner();
   if (flags.versus.empty()) {
-    workflow::RecordEpisodeVideo(runner, episode, flags.video, bar.Callback());
+    workflow::RecordEpisodeVideo(runner, episode, flags.video, Interruptible(bar, session));
     return;
   }
   workflow::EpisodeRunner versus = make_versus();
   std::vector<workflow::EpisodeFilm> films;
   films.push_back(workflow::FilmEpisode(runner, episode, flags.policy));
   films.push_back(workflow::FilmEpisode(versus, episode, flags.versus));
-  workflow::WriteVideo(films, flags.video, bar.Callback());
+  workflow::WriteVideo(films, flags.video, Interruptible(bar, session));
 }
 
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
-  const Parallelism jobs = ParseJobs(flags.jobs);
+  const Parallelism jobs = Parallelism(flags.jobs);
   const workflow::Placement placement = workflow::ParsePlacement(flags.placement);
   workflow::ParseFaults(flags.noise);  // an unknown name fails before the contact map is built
 
@@ -145,43 +154,53 @@ void Run(const Flags& flags, Session& session) {
   workflow::PlanningSetupOptions setup_options;
   if (database) setup_options = workflow::SetupOptionsOf(database->identity());
   setup_options.jobs = jobs;
-  setup_options.progress = map_bar.Callback();
+  setup_options.progress = Interruptible(map_bar, session);
   const auto setup =
       std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
   map_bar.Finish();
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
 
   workflow::EpisodeOptions options;
-  options.seed = ParseSeed(flags.seed);
+  options.seed = flags.seed;
   options.family = FamilyFor(flags, setup->task(), database.get());
   options.noise = flags.noise;
   options.placement = placement;
   if (!flags.perception.empty()) options.perception = PerceptionFor(flags.table, *setup);
   options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
-  options.confirm_limit_m = flags.confirm_limit_m;
+  if (flags.confirm_limit_m > 0.0) options.confirm_limit_m = flags.confirm_limit_m;
   options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
   const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };
 
-  std::ofstream out;
+  std::optional<OutputFile> out;
   if (!flags.out.empty()) {
-    out.open(flags.out);
-    if (!out) throw InputError("--out", "cannot write " + flags.out, "choose another file");
-    evaluation::WriteSceneFile(*scene, std::filesystem::path(flags.out).parent_path().string());
+    out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+    if (!out->direct()) {  // a pipe has no folder
+      const std::string folder = std::filesystem::path(flags.out).parent_path().string();
+      RequireOutputs({{"--out", evaluation::SceneFile(folder, setup->task().name), FileKind::kScene}}, Inputs(flags));
+      evaluation::WriteSceneFile(*scene, folder);
+    }
   }
   std::vector<evaluation::EpisodeSummaryRow> rows;
   int solved_online = 0;  // though a database was to answer
   const auto on_record = [&](const workflow::EpisodeRecord& record) {
     if (flags.policy == "database" && record.policy != flags.policy) ++solved_online;
     rows.push_back(evaluation::SummaryRow(record));
-    if (out.is_open()) out << evaluation::ToJson(record).dump() << "\n" << std::flush;
+    if (out) out->Write(evaluation::ToJson(record).dump() + "\n");
   };
   ProgressBar bar("episodes");
-  workflow::RunEpisodes(workflow::EpisodeRange(0, flags.episodes), jobs, make_runner, on_record, bar.Callback(),
-                        session.cancellation);
+  try {
+    workflow::RunEpisodes(workflow::EpisodeRange(0, flags.episodes), jobs, make_runner, on_record, bar.Callback(),
+                          session.cancellation);
+  } catch (const InputError&) {  // of the output: what is there is cut off
+    throw;
+  } catch (...) {  // of the world or the machine: what is done is kept
+    if (out && !rows.empty()) out->Commit();
+    throw;
+  }
   bar.Finish();
-  if (out.is_open() && !out) throw InputError("--out", "cannot write all of " + flags.out, "free some space");
+  if (out && !rows.empty()) out->Commit();
 
   if (!flags.video.empty() && !session.cancellation->cancelled()) {
     workflow::EpisodeOptions film_options = options;
@@ -192,13 +211,12 @@ void Run(const Flags& flags, Session& session) {
       versus_options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.versus);
       return workflow::EpisodeRunner(setup, scene, versus_factory, versus_options);
     };
-    WriteVideo(flags, film, film_versus);
+    WriteVideo(flags, session, film, film_versus);
   }
 
   if (solved_online > 0) {
-    fmt::print(stderr,
-               "{} of {} episodes met problems that {} does not hold: solved online (feeler preprocess adds them)\n",
-               solved_online, rows.size(), flags.db);
+    Note("{} of {} episodes met problems that {} does not hold: solved online (feeler preprocess adds them)\n",
+         solved_online, rows.size(), flags.db);
   }
   const evaluation::RunSummary summary = evaluation::Summarize(rows);
   if (flags.json) {
@@ -213,11 +231,11 @@ void Run(const Flags& flags, Session& session) {
     json["seed"] = flags.seed;
     PrintJson(json);
   } else {
-    fmt::print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
-               flags.seed, summary.episodes, evaluation::ToText(summary));
+    Print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
+          flags.seed, summary.episodes, evaluation::ToText(summary));
   }
   if (session.cancellation->cancelled()) {
-    fmt::print(stderr, "interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);
+    Note("feeler: interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);
     session.exit_code = 1;
   }
 }
@@ -233,8 +251,8 @@ void AddRunCommand(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--policy-option", flags->policy_options,
                       "KEY=VALUE, an option of the policy (docs/add-a-policy.md); may be given several times");
-  command->add_option("--episodes", flags->episodes, "how many")->capture_default_str();
-  command->add_option("--seed", flags->seed, "of all draws")->capture_default_str();
+  AddInteger(*command, "--episodes", flags->episodes, 1, kMostEpisodes, "how many");
+  AddSeed(*command, flags->seed, "of all draws");
   command->add_option("--extents", flags->extents,
                       "always this problem, e.g. 7x7x7 (default: drawn from the database)");
   command->add_option("--noise", flags->noise, NoiseHelp())->capture_default_str();
@@ -246,15 +264,16 @@ void AddRunCommand(CLI::App& app, Session& session) {
                       "icp: hypotheses from a depth camera that looks at a target in the workspace (with --table)");
   command->add_option("--table", flags->table, "uncertainty table of the task (feeler perceive calibrate)");
   command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
-  command->add_option("--confirm-limit", flags->confirm_limit_m,
-                      "touch until the position across the insertion is known this well, m (default: 0.0005)");
+  AddReal(*command, "--confirm-limit", flags->confirm_limit_m, 1e-6, 1.0,
+          "touch until the position across the insertion is known this well, m, default: 0.0005", false);
   command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
                     "leave the true pose out of what the environment tells; the records stay the same");
-  command->add_option("--jobs", flags->jobs, "threads; the records do not depend on it")->capture_default_str();
+  AddJobs(*command, flags->jobs, "threads; the records do not depend on it");
   command->add_option("--out", flags->out, "records, one JSON object a line (docs/file-formats.md)");
   command->add_option("--video", flags->video, "MP4 of one episode");
   command->add_option("--versus", flags->versus, "a second policy beside it in the video, on the same episode");
-  command->add_option("--video-episode", flags->video_episode, "which episode the video shows")->capture_default_str();
+  AddInteger(*command, "--video-episode", flags->video_episode, 0, std::numeric_limits<std::int64_t>::max(),
+             "which episode the video shows");
   command->add_flag("--json", flags->json, "print the summary as JSON");
   command->callback([flags, &session] { Run(*flags, session); });
 }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "feeler/cli/progress_bar.h"
 #include "feeler/core/progress.h"
 
 namespace feeler::cli {
@@ -16,7 +17,8 @@ struct Session {
 /// Prints a result for machines: one JSON document on stdout.
 void PrintJson(const nlohmann::json& value);
 
-/// Fails with an InputError unless a file can be created or replaced at `path` (checked before long work begins).
-void RequireWritable(const std::string& option, const std::string& path);
+/// Updates the bar, and ends the work with Interrupted where a signal has come: for work that leaves nothing to keep
+/// when it is given up. The bar must outlive the callback.
+ProgressCallback Interruptible(ProgressBar& bar, const Session& session);
 
 }  // namespace feeler::cli

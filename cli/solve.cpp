@@ -7,11 +7,15 @@
 #include <thread>
 
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/policy_output.h"
 #include "feeler/cli/pomdp.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/planner/belief/lattice_problem.h"
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/io/lattice_problem_file.h"
@@ -34,7 +38,7 @@ struct Flags {
   PomdpFlags pomdp;
 };
 
-planner::Problem LoadProblem(const Flags& flags) {
+planner::Problem LoadProblem(const Flags& flags, const Session& session) {
   if (flags.task.empty() == flags.problem.empty()) {
     throw InputError("solve", "give either --task with --extents, or --problem, or --pomdp", "see feeler solve --help");
   }
@@ -55,8 +59,8 @@ planner::Problem LoadProblem(const Flags& flags) {
   options.opening = ParseOpening(flags.opening);
   options.cost_kind = ParseCost(flags.cost);
   if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
-  options.jobs = ParseJobs(flags.jobs);
-  options.progress = bar.Callback();
+  options.jobs = Parallelism(flags.jobs);
+  options.progress = Interruptible(bar, session);
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
   const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
   workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
@@ -74,14 +78,14 @@ std::string NameOf(const planner::Problem& problem, int hypothesis) {
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 void PrintResult(const planner::SolverResult& result, const std::string& unit) {
-  fmt::print("status         {}\n", planner::ToString(result.status));
+  Print("status         {}\n", planner::ToString(result.status));
   if (result.complete()) {
-    fmt::print("expected cost  {:.6g} {}\nlower bound    {:.6g}\nratio          {:.4f}\npolicy nodes   {}\n",
-               result.expected_cost, unit, result.lower_bound, result.Ratio(), result.policy->nodes.size());
+    Print("expected cost  {:.6g} {}\nlower bound    {:.6g}\nratio          {:.4f}\npolicy nodes   {}\n",
+          result.expected_cost, unit, result.lower_bound, result.Ratio(), result.policy->nodes.size());
   } else {
-    fmt::print("lower bound    {:.6g}\n", result.lower_bound);
+    Print("lower bound    {:.6g}\n", result.lower_bound);
   }
-  fmt::print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s, result.wall_s);
+  Print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s, result.wall_s);
 }
 
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
@@ -91,34 +95,34 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   RequireNoPomdpFlags(command);
   planner::SolverOptions options = flags.solver.Options(command);
   options.cancellation = session.cancellation;
-  if (!flags.out.empty()) RequireWritable("--out", flags.out);
-  const planner::Problem problem = LoadProblem(flags);
+  std::vector<std::string> inputs = flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task);
+  inputs.push_back(flags.problem);
+  RequireOutputs({{"--out", flags.out, FileKind::kPolicy}}, inputs);
+  const planner::Problem problem = LoadProblem(flags, session);
 
   bool header = false;
   options.on_bounds = [&header](const planner::BoundsRow& row) {
     if (!std::isfinite(row.lower_bound)) return;  // unlocalizable: said below
     if (!header) {
-      fmt::print(stderr, "{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper",
-                 "ratio");
+      Note("{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper", "ratio");
       header = true;
     }
-    fmt::print(stderr, "{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
-               row.lower_bound, row.upper_bound, row.Ratio());
+    Note("{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
+         row.lower_bound, row.upper_bound, row.Ratio());
   };
   planner::Validate(options);
   ProgressBar table_bar("tables");
-  options.on_tables = table_bar.Callback();
+  options.on_tables = Interruptible(table_bar, session);
   const std::clock_t tables_start = std::clock();
-  const auto tables = planner::BuildPlanningTables(problem, options, ParseJobs(flags.jobs));
+  const auto tables = planner::BuildPlanningTables(problem, options, Parallelism(flags.jobs));
   const double tables_cpu_s = static_cast<double>(std::clock() - tables_start) / CLOCKS_PER_SEC;
   table_bar.Finish();
   const planner::SolverResult result = planner::Solve(problem, options, tables);
 
   if (result.status == planner::SolverStatus::kUnlocalizable) {
-    fmt::print(stderr, "feeler: {} pairs of hypotheses cannot be told apart by any probe:\n",
-               result.indistinguishable.size());
+    Note("feeler: {} pairs of hypotheses cannot be told apart by any probe:\n", result.indistinguishable.size());
     for (const auto& [i, j] : result.indistinguishable) {
-      fmt::print(stderr, "  {} {} and {} {}\n", i, NameOf(problem, i), j, NameOf(problem, j));
+      Note("  {} {} and {} {}\n", i, NameOf(problem, i), j, NameOf(problem, j));
     }
   }
   if (result.complete() && !flags.out.empty())
@@ -164,7 +168,7 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   command->add_option("--cost", flags->cost, "distance (the task's or file's weights) or time, in seconds")
       ->capture_default_str();
   command->add_option("--out", flags->out, "policy file to write");
-  command->add_option("--jobs", flags->jobs, "threads, for contact map and tables")->capture_default_str();
+  AddJobs(*command, flags->jobs, "threads, for contact map and tables");
   command->add_flag("--json", flags->json, "print the result as JSON");
   flags->solver.AddTo(*command);
   flags->pomdp.AddTo(*command);

@@ -3,10 +3,14 @@
 #include <array>
 #include <cmath>
 
+#include "feeler/cli/numbers.h"
 #include "feeler/core/error.h"
 
 namespace feeler::cli {
 namespace {
+
+/// Of epsilon and gap: beyond, a policy is as good as none and sums overflow.
+constexpr double kMostRatio = 1e6;
 
 template <class Kind, std::size_t kCount>
 Kind Choose(const std::string& option, const std::string& text, const std::array<Kind, kCount>& kinds) {
@@ -27,13 +31,12 @@ void SolverFlags::AddTo(CLI::App& command) {
                   "fast: canonical translation, tight heuristic; paper: as printed, medium heuristic")
       ->capture_default_str();
   command.add_option("--heuristic", heuristic, "certificate, cuboids, lines or first-contact (default: the setting's)");
-  command.add_option("--epsilon", epsilon, "inflation of the heuristic (rtdp-bel, e-rtdp-bel), >= 1")
-      ->capture_default_str();
-  command.add_option("--gap", gap, "stop at this ratio of expected cost to lower bound (certified), >= 1")
-      ->capture_default_str();
-  command.add_option("--time-limit", time_limit_s, "wall seconds per problem (default: none)");
-  command.add_option("--expansion-limit", expansion_limit, "belief expansions per problem (default: none)");
-  command.add_option("--seed", seed, "of the sampled trials")->capture_default_str();
+  AddReal(command, "--epsilon", epsilon, 1.0, kMostRatio, "inflation of the heuristic (rtdp-bel, e-rtdp-bel)");
+  AddReal(command, "--gap", gap, 1.0, kMostRatio, "stop at this ratio of expected cost to lower bound (certified)");
+  AddReal(command, "--time-limit", time_limit_s, 1e-6, 1e9, "wall seconds per problem, default: none", false);
+  AddInteger(command, "--expansion-limit", expansion_limit, 1, std::int64_t{1'000'000'000'000},
+             "belief expansions per problem, default: none", false);
+  AddSeed(command, seed, "of the sampled trials");
 }
 
 planner::SolverOptions SolverFlags::Options(const CLI::App& command) const {
@@ -56,8 +59,7 @@ planner::SolverOptions SolverFlags::Options(const CLI::App& command) const {
     options.cuboids_where_tight = false;
   }
   options.gap = gap;
-  options.seed = ParseSeed(seed);
-  // Given limits are passed on as they are, so that 0 and nonsense are rejected rather than taken for "none".
+  options.seed = seed;
   if (command.count("--time-limit") > 0) options.time_limit_s = time_limit_s;
   if (command.count("--expansion-limit") > 0) options.expansion_limit = expansion_limit;
   planner::Validate(options);
@@ -80,18 +82,6 @@ CostKind ParseCost(const std::string& text) {
 
 GoalKind ParseGoal(const std::string& text) {
   return Choose("--goal", text, std::array{GoalKind::kSingleton, GoalKind::kInsertable});
-}
-
-std::uint64_t ParseSeed(std::int64_t seed) {
-  if (seed < 0) throw InputError("--seed", std::to_string(seed) + " is negative", "give a number of at least 0");
-  return static_cast<std::uint64_t>(seed);
-}
-
-Parallelism ParseJobs(int jobs) {
-  if (jobs < 1 || jobs > 1024) {
-    throw InputError("--jobs", std::to_string(jobs) + " threads", "give a number from 1 to 1024");
-  }
-  return Parallelism(jobs);
 }
 
 }  // namespace feeler::cli

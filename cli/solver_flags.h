@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "feeler/core/parallelism.h"
 #include "feeler/env/contact/contact_map_builder.h"
 #include "feeler/planner/options/solver_options.h"
 #include "feeler/planner/solve.h"
@@ -19,7 +18,7 @@ struct SolverFlags {
   double gap = 1.2;
   double time_limit_s = 0.0;  ///< 0: not given
   std::int64_t expansion_limit = 0;
-  std::int64_t seed = 1;
+  std::uint64_t seed = 1;
 
   void AddTo(CLI::App& command);
   /// Throws InputError naming the option that is out of range.
@@ -34,9 +33,5 @@ planner::ExperienceKind ParseExperience(const std::string& text);
 CostKind ParseCost(const std::string& text);
 /// --goal singleton|insertable.
 GoalKind ParseGoal(const std::string& text);
-/// --seed, at least 0.
-std::uint64_t ParseSeed(std::int64_t seed);
-/// --jobs, 1..1024.
-Parallelism ParseJobs(int jobs);
 
 }  // namespace feeler::cli

@@ -4,17 +4,22 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <numbers>
+#include <system_error>
 #include <thread>
 
 #include "feeler/cad/pipe_parts.h"
 #include "feeler/cli/commands.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/cli/task_import.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/parallelism.h"
 #include "feeler/env/contact/axis_visibility.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/env/vision/image.h"
@@ -103,51 +108,51 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
 
 void PrintVisibility(const env::AxisVisibility& axis) {
   if (!axis.felt()) {
-    fmt::print(
+    Print(
         "felt           {}: NOT SEEN by contact (no probe differs by more than {:.3f} cells): drop the axis, or give "
         "the part a feature\n",
         ToString(axis.kind), axis.largest_difference_cells);
     return;
   }
-  fmt::print("felt           {}: neighbours differ in {} probes at least, by up to {:.2f} cells{}\n",
-             ToString(axis.kind), axis.fewest_probes, axis.largest_difference_cells,
-             axis.alike_pairs == 0 ? "" : fmt::format("; {} of {} pairs are alike", axis.alike_pairs, axis.pairs));
+  Print("felt           {}: neighbours differ in {} probes at least, by up to {:.2f} cells{}\n", ToString(axis.kind),
+        axis.fewest_probes, axis.largest_difference_cells,
+        axis.alike_pairs == 0 ? "" : fmt::format("; {} of {} pairs are alike", axis.alike_pairs, axis.pairs));
 }
 
 void PrintTask(const workflow::PlanningSetup& setup) {
   const Task& task = setup.task();
   const planner::ContactMap& map = *setup.map;
-  fmt::print("task           {}\nfile           {}\nfingerprint    {}\n", task.name, setup.model.file.string(),
-             setup.fingerprint);
+  Print("task           {}\nfile           {}\nfingerprint    {}\n", task.name, setup.model.file.string(),
+        setup.fingerprint);
   std::int64_t problems = 1;
   std::int64_t hypotheses = 1;
   for (const UncertainAxis& axis : task.axes) {
     const double scale = axis.angular() ? 180 / std::numbers::pi : 1000;
     const char* unit = axis.angular() ? "deg" : "mm";
-    fmt::print("axis {:<9} {}..{} hypotheses at {:.4g} {} (up to {:.4g} {})\n", ToString(axis.kind), axis.min_cells,
-               axis.max_cells, axis.resolution * scale, unit, axis.max_cells * axis.resolution * scale, unit);
+    Print("axis {:<9} {}..{} hypotheses at {:.4g} {} (up to {:.4g} {})\n", ToString(axis.kind), axis.min_cells,
+          axis.max_cells, axis.resolution * scale, unit, axis.max_cells * axis.resolution * scale, unit);
     problems *= axis.max_cells - axis.min_cells + 1;
     hypotheses *= axis.max_cells;
   }
-  fmt::print("family         {} problems of at most {} hypotheses\n", problems, hypotheses);
-  fmt::print("insertion      {}, {:.4g} mm deep, tolerance {:.4g} mm lateral, {:.4g} mm vertical, {:.4g} deg\n",
-             ToString(task.insertion), task.insertion_depth_m * 1000, task.tolerance.lateral_m * 1000,
-             task.tolerance.vertical_m * 1000, task.tolerance.angle_rad * 180 / std::numbers::pi);
-  fmt::print("cost           {} per cell, {} per contact, {} per action; goal {}\n", task.cost.per_cell,
-             task.cost.per_contact, task.cost.per_action, ToString(task.goal));
-  fmt::print("move lengths   {}\n", fmt::join(task.move_lengths, ", "));
+  Print("family         {} problems of at most {} hypotheses\n", problems, hypotheses);
+  Print("insertion      {}, {:.4g} mm deep, tolerance {:.4g} mm lateral, {:.4g} mm vertical, {:.4g} deg\n",
+        ToString(task.insertion), task.insertion_depth_m * 1000, task.tolerance.lateral_m * 1000,
+        task.tolerance.vertical_m * 1000, task.tolerance.angle_rad * 180 / std::numbers::pi);
+  Print("cost           {} per cell, {} per contact, {} per action; goal {}\n", task.cost.per_cell,
+        task.cost.per_contact, task.cost.per_action, ToString(task.goal));
+  Print("move lengths   {}\n", fmt::join(task.move_lengths, ", "));
   const Cell size = map.domain().Size();
-  fmt::print("contact map    {} x {} x {} displacements of {:.4g} mm, {} orientation{}, opening {}, {:.1f} % blocked\n",
-             size.x(), size.y(), size.z(), task.cell_m * 1000, map.orientations(), map.orientations() == 1 ? "" : "s",
-             env::ToString(setup.opening), 100 * BlockedShare(map));
-  fmt::print("lattice phase  {:.3f}, {:.3f}, {:.3f} cells; walls{} at least {:.3f} cells from a lattice plane\n",
-             map.phase().x(), map.phase().y(), map.phase().z(),
-             map.orientations() == 1 ? "" : " of the target as estimated", map.margin_cells());
+  Print("contact map    {} x {} x {} displacements of {:.4g} mm, {} orientation{}, opening {}, {:.1f} % blocked\n",
+        size.x(), size.y(), size.z(), task.cell_m * 1000, map.orientations(), map.orientations() == 1 ? "" : "s",
+        env::ToString(setup.opening), 100 * BlockedShare(map));
+  Print("lattice phase  {:.3f}, {:.3f}, {:.3f} cells; walls{} at least {:.3f} cells from a lattice plane\n",
+        map.phase().x(), map.phase().y(), map.phase().z(), map.orientations() == 1 ? "" : " of the target as estimated",
+        map.margin_cells());
   if (map.orientations() > 1) {
-    fmt::print("               turned, {:.1f} % of what is met lies within {} cells of one\n",
-               100 * env::ShareOfWallsNear(map, kNearWall_cells), kNearWall_cells);
+    Print("               turned, {:.1f} % of what is met lies within {} cells of one\n",
+          100 * env::ShareOfWallsNear(map, kNearWall_cells), kNearWall_cells);
   }
-  if (task.turns_freely) fmt::print("mating         round: a turn about the insertion axis is no error\n");
+  if (task.turns_freely) Print("mating         round: a turn about the insertion axis is no error\n");
   for (const env::AxisVisibility& axis : env::AxisVisibilities(task, map)) PrintVisibility(axis);
 }
 
@@ -155,7 +160,7 @@ void Show(const Flags& flags) {
   ProgressBar bar("contact map");
   workflow::PlanningSetupOptions options;
   options.opening = ParseOpening(flags.opening);
-  options.jobs = ParseJobs(flags.jobs);
+  options.jobs = Parallelism(flags.jobs);
   options.progress = bar.Callback();
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
   bar.Finish();
@@ -178,21 +183,19 @@ env::Image RenderView(const env::TaskModel& model, const Flags& flags) {
 }
 
 void Render(const Flags& flags) {
-  RequireWritable("--out", flags.out);
+  RequireOutputs({{"--out", flags.out, FileKind::kPng}}, InputsOfTask(flags.task));
   env::WritePng(RenderView(env::LoadTask(flags.task), flags), flags.out);
 }
 
 void MakePipeParts(const cad::PipeParameters& parameters, const std::string& folder) {
-  if (!std::filesystem::is_directory(folder)) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
     throw InputError("--out", "\"" + folder + "\" is not a folder", "make it first");
   }
   for (const cad::PartFile& part : cad::GeneratePipeParts(parameters)) {
     const std::string path = (std::filesystem::path(folder) / part.name).string();
-    std::ofstream file(path);
-    file << part.text;
-    file.close();
-    if (!file) throw InputError("--out", "cannot write " + path);
-    fmt::print("{}\n", path);
+    WriteFileAtomically(path, part.text);
+    Print("{}\n", path);
   }
 }
 
@@ -202,7 +205,7 @@ void List(bool json) {
     PrintJson(names);
     return;
   }
-  for (const std::string& name : names) fmt::print("{}\n", name);
+  for (const std::string& name : names) Print("{}\n", name);
 }
 
 }  // namespace
@@ -217,7 +220,7 @@ void AddTaskCommand(CLI::App& app, Session& session) {
   CLI::App* show = task->add_subcommand("show", "Axes, ranges, tolerance and contact map of a task");
   show->add_option("task", flags->task, "name, or path of a task file")->required();
   show->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
-  show->add_option("--jobs", flags->jobs, "threads, if the contact map must be built")->capture_default_str();
+  AddJobs(*show, flags->jobs, "threads, if the contact map must be built");
   show->add_flag("--json", flags->json, "print JSON");
   show->callback([flags] { Show(*flags); });
   CLI::App* render =
@@ -236,7 +239,7 @@ void AddTaskCommand(CLI::App& app, Session& session) {
       task->add_subcommand("make-pipe-parts", "Writes the parts of pipes and elbows from sizes in metres");
   auto sizes = std::make_shared<cad::PipeParameters>();
   const auto size = [&](const char* name, double& value, const char* help) {
-    pipes->add_option(name, value, help)->capture_default_str();
+    AddReal(*pipes, name, value, 0.0, 10.0, help);
   };
   size("--pipe-diameter", sizes->pipe_diameter_m, "outside of a pipe");
   size("--elbow-diameter", sizes->elbow_diameter_m, "outside of an elbow");

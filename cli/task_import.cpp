@@ -10,6 +10,9 @@
 #include <vector>
 
 #include "feeler/cad/readers/read_part.h"
+#include "feeler/cli/console.h"
+#include "feeler/cli/numbers.h"
+#include "feeler/cli/outputs.h"
 #include "feeler/cli/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
@@ -130,28 +133,28 @@ evaluation::ImportOptions OptionsFrom(const Flags& flags) {
   if (!(flags.deviation > 0 && flags.deviation < 1))
     throw InputError("--deviation", "is not a share between 0 and 1", "0.1 is a tenth of the clearance");
   options.deviation_share = flags.deviation;
-  options.on_stage = [](const std::string& what) { fmt::print(stderr, "{}\n", what); };
+  options.on_stage = [](const std::string& what) { Note("{}\n", what); };
   return options;
 }
 
 void Print(const evaluation::ImportedTask& task, const std::string& verdict) {
   const cad::Mating& m = task.mating;
-  fmt::print("task           {}\n", task.task_file.string());
-  fmt::print("tool           {} ({}; {} triangles, {} convex pieces)\n", task.tool.file, task.tool.unit,
-             task.tool.checked.mesh.size(), task.tool.pieces.size());
-  fmt::print("target         {} ({}; {} triangles, {} convex pieces)\n", task.target.file, task.target.unit,
-             task.target.checked.mesh.size(), task.target.pieces.size());
-  fmt::print("clearance      {:.4f} x {:.4f} mm a side (pieces: {:.4f} x {:.4f})\n", 1000 * m.clearance_m.x(),
-             1000 * m.clearance_m.y(), 1000 * task.pieces_clearance_m.x(), 1000 * task.pieces_clearance_m.y());
-  fmt::print("lead-in        {:.4f} x {:.4f} mm\n", 1000 * m.lead_in_m.x(), 1000 * m.lead_in_m.y());
-  fmt::print("depth          {:.4f} mm{}\n", 1000 * m.depth_m, m.through ? ", through" : "");
-  fmt::print("deviation      tool {:.4f} mm, target {:.4f} mm where they mate; {:.4f} and {:.4f} anywhere\n",
-             1000 * task.tool.mating.largest_m(), 1000 * task.target.mating.largest_m(),
-             1000 * task.tool.anywhere.largest_m(), 1000 * task.target.anywhere.largest_m());
-  fmt::print("cell           {:.4g} mm, margin {:.3f} cells\n", 1000 * task.content.numbers.cell_m,
-             task.content.numbers.margin_cells);
-  for (const std::string& note : task.notes) fmt::print("note           {}\n", note);
-  fmt::print("verdict        {}\n", verdict);
+  Print("task           {}\n", task.task_file.string());
+  Print("tool           {} ({}; {} triangles, {} convex pieces)\n", task.tool.file, task.tool.unit,
+        task.tool.checked.mesh.size(), task.tool.pieces.size());
+  Print("target         {} ({}; {} triangles, {} convex pieces)\n", task.target.file, task.target.unit,
+        task.target.checked.mesh.size(), task.target.pieces.size());
+  Print("clearance      {:.4f} x {:.4f} mm a side (pieces: {:.4f} x {:.4f})\n", 1000 * m.clearance_m.x(),
+        1000 * m.clearance_m.y(), 1000 * task.pieces_clearance_m.x(), 1000 * task.pieces_clearance_m.y());
+  Print("lead-in        {:.4f} x {:.4f} mm\n", 1000 * m.lead_in_m.x(), 1000 * m.lead_in_m.y());
+  Print("depth          {:.4f} mm{}\n", 1000 * m.depth_m, m.through ? ", through" : "");
+  Print("deviation      tool {:.4f} mm, target {:.4f} mm where they mate; {:.4f} and {:.4f} anywhere\n",
+        1000 * task.tool.mating.largest_m(), 1000 * task.target.mating.largest_m(),
+        1000 * task.tool.anywhere.largest_m(), 1000 * task.target.anywhere.largest_m());
+  Print("cell           {:.4g} mm, margin {:.3f} cells\n", 1000 * task.content.numbers.cell_m,
+        task.content.numbers.margin_cells);
+  for (const std::string& note : task.notes) Print("note           {}\n", note);
+  Print("verdict        {}\n", verdict);
 }
 
 void Import(const Flags& flags, Session& session) {
@@ -231,8 +234,8 @@ void AddTaskImport(CLI::App& task, Session& session) {
                    "largest deviation of the pieces where the parts mate, as a share of the clearance")
       ->capture_default_str();
   command->add_flag("--no-trial", flags->no_trial, "do not solve and run episodes");
-  command->add_option("--episodes", flags->episodes, "of each kind in the trial")->capture_default_str();
-  command->add_option("--jobs", flags->jobs, "threads of the trial")->capture_default_str();
+  AddInteger(*command, "--episodes", flags->episodes, 1, 1000000, "of each kind in the trial");
+  AddJobs(*command, flags->jobs, "threads of the trial");
   command->add_flag("--json", flags->json, "print what was measured as JSON");
   command->callback([flags, &session] { Import(*flags, session); });
 }

@@ -13,9 +13,11 @@ namespace {
 
 void Check(const Task& task, const planner::Problem& problem) {
   if (!problem.map || problem.hypotheses.empty()) {
-    throw InputError("executor", "the problem has no contact map or no hypothesis");
+    throw InputError("executor", "the problem has no contact map or no hypothesis",
+                     "give a problem made by MakeCuboidProblem");
   }
-  if (!(task.cell_m > 0.0)) throw InputError("executor", "the cell size of the task is not positive");
+  if (!(task.cell_m > 0.0))
+    throw InputError("executor", "the cell size of the task is not positive", "give a positive resolution");
 }
 
 }  // namespace

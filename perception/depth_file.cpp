@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <opencv2/imgcodecs.hpp>
 
+#include "feeler/core/captured_stderr.h"
 #include "feeler/core/error.h"
 #include "feeler/perception/input_file.h"
 
@@ -115,14 +116,17 @@ DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera,
         "give the intrinsics of this image");
   }
   cv::Mat image;
+  std::string complaint;  // of libpng
   try {
+    const CapturedStderr captured;
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data()));
     image = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+    complaint = captured.LastLine();
   } catch (const cv::Exception&) {
     image = cv::Mat();
   }
   if (image.empty() || image.type() != CV_16UC1 || image.cols != camera.width || image.rows != camera.height) {
-    throw InputError(where, "is damaged", "give a whole 16-bit grey PNG");
+    throw InputError(where, "is damaged" + (complaint.empty() ? "" : ": " + complaint), "give a whole 16-bit grey PNG");
   }
   DepthFrame frame{camera.width, camera.height, {}};
   frame.depth_m.reserve(static_cast<std::size_t>(image.total()));
@@ -147,7 +151,7 @@ DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera,
 std::string EncodeDepthPng(const DepthFrame& frame, double depth_scale_m) {
   if (frame.depth_m.size() != static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height) ||
       frame.depth_m.empty()) {
-    throw InputError("depth image", "is empty");
+    throw InputError("depth image", "is empty", "give an image with pixels");
   }
   cv::Mat image(frame.height, frame.width, CV_16UC1);
   for (int row = 0; row < frame.height; ++row) {

@@ -56,18 +56,6 @@ std::string ReadFile(const std::string& path) {
   return std::move(bytes).str();
 }
 
-void WriteFile(const std::string& path, std::string_view content) {
-  const std::string beside = path + ".tmp";
-  {
-    std::ofstream out(beside, std::ios::binary);
-    out.write(content.data(), static_cast<std::streamsize>(content.size()));
-    if (!out.flush()) throw InputError(path, "cannot be written", "choose another file or free some space");
-  }
-  std::error_code error;
-  std::filesystem::rename(beside, path, error);
-  if (error) throw InputError(path, "cannot be written: " + error.message(), "choose another file");
-}
-
 nlohmann::json ParseJson(std::string_view text, const std::string& where) {
   constexpr int kDeepest = 16;
   // The library's parser recurses into nothing here: the callback refuses what is nested too deep.

@@ -15,9 +15,6 @@ inline constexpr std::size_t kLargestFile = std::size_t{1} << 28;
 /// The file's bytes. Throws InputError if it cannot be read or is larger than kLargestFile.
 std::string ReadFile(const std::string& path);
 
-/// Writes beside the path and renames: the file is whole or not there. Throws InputError.
-void WriteFile(const std::string& path, std::string_view content);
-
 /// Parses JSON; the nesting is limited. Throws InputError naming `where`.
 nlohmann::json ParseJson(std::string_view text, const std::string& where);
 

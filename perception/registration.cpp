@@ -174,7 +174,7 @@ TargetModel::TargetModel(const SurfacePoints& surface)
 
 void RegistrationOptions::Validate() const {
   const auto require = [](bool good, const char* what) {
-    if (!good) throw InputError("registration options", what);
+    if (!good) throw InputError("registration options", what, "see perception/registration.h");
   };
   for (const Eigen::Vector3d& axis : rotation_axes) {
     require(std::abs(axis.norm() - 1.0) < 1e-6, "a rotation axis is not a unit vector");

@@ -155,7 +155,8 @@ SolverResult Solve(const Problem& problem, const SolverOptions& options, std::sh
   Validate(problem);
   Validate(options);
   if (experience.kind == ExperienceKind::kNaive && experience.policy != nullptr && experience.problem == nullptr) {
-    throw InputError("experience", "a naive experience needs the problem its policy was made for");
+    throw InputError("experience", "a naive experience needs the problem its policy was made for",
+                     "pass the problem too");
   }
   StopWatch watch(options);
   if (!tables) tables = BuildPlanningTables(problem, options);

@@ -14,12 +14,16 @@ DatabasePolicy::DatabasePolicy(std::shared_ptr<const planner::PolicyGraph> polic
   for (const planner::PolicyNode& node : policy_->nodes) {
     for (const planner::PolicyBranch& branch : node.branches) {
       if (branch.next >= policy_->nodes.size()) {
-        throw InputError("policy", "a branch leads to node " + std::to_string(branch.next) + " of " +
-                                       std::to_string(policy_->nodes.size()));
+        throw InputError(
+            "policy",
+            "a branch leads to node " + std::to_string(branch.next) + " of " + std::to_string(policy_->nodes.size()),
+            "make the policy again");
       }
     }
-    if (node.is_leaf() && node.leaf.empty()) throw InputError("policy", "a leaf holds no hypothesis");
-    if (!node.is_leaf() && node.move.cells < 1) throw InputError("policy", "a move of less than one cell");
+    if (node.is_leaf() && node.leaf.empty())
+      throw InputError("policy", "a leaf holds no hypothesis", "make the policy again");
+    if (!node.is_leaf() && node.move.cells < 1)
+      throw InputError("policy", "a move of less than one cell", "make the policy again");
   }
   node_ = policy_->root;
 }

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/planner/contact/contact_map_file.h"
 
@@ -20,7 +21,9 @@ fs::path CacheFolder() {
   if (const fs::path folder = variable("FEELER_CACHE_DIR"); !folder.empty()) return folder;
   if (const fs::path folder = variable("XDG_CACHE_HOME"); !folder.empty()) return folder / "feeler";
   if (const fs::path folder = variable("HOME"); !folder.empty()) return folder / ".cache" / "feeler";
-  return fs::temp_directory_path() / "feeler-cache";
+  std::error_code error;
+  const fs::path folder = fs::temp_directory_path(error);
+  return (error ? fs::path("/tmp") : folder) / "feeler-cache";
 }
 
 ContactMap GetContactMap(const TaskModel& task_model, Opening opening, Parallelism parallelism,

@@ -153,14 +153,14 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const ResetOptions& options) 
   Pose drawn = DrawTruePose(task(), estimate_, extents, random);
   if (!options.hypotheses.empty()) {
     for (const Pose& pose : options.hypotheses) {
-      if (!pose.matrix().allFinite()) throw InputError("reset", "a hypothesis is not finite");
+      if (!pose.matrix().allFinite()) throw InputError("reset", "a hypothesis is not finite", "give finite numbers");
     }
     drawn = options.hypotheses[random.Index(options.hypotheses.size())];
   }
   drawn.linear() = drawn.linear() * Eigen::AngleAxisd(variation_.yaw_rad, -UnitVector(task().insertion));
   const Pose truth = options.world_T_target.value_or(drawn);
   if (!truth.matrix().allFinite() || !estimate_.matrix().allFinite()) {
-    throw InputError("reset", "the pose of the target is not finite");
+    throw InputError("reset", "the pose of the target is not finite", "give finite numbers");
   }
   NoiseOptions noise = options.noise;
   noise.force_offset_n += variation_.force_bias_n;

@@ -248,7 +248,7 @@ void VectorEnv::RequireWelcome(const Slot& slot, const Action& action) const {
     if (slot.over && options_.auto_reset == AutoResetMode::kNextStep) return;
     slot.env.RequireWelcome(action);
   } catch (const InputError& error) {
-    throw InputError(fmt::format("environment {}", slot.index), error.what());
+    throw InputError(fmt::format("environment {}", slot.index), error.what(), "see the message of the environment");
   }
 }
 

@@ -50,7 +50,7 @@ ModelHandle CompileMjcf(const std::string& xml, const std::string& where) {
   };
   const auto vfs = std::make_unique<Vfs>();
   if (mj_makeEmptyFileVFS(&vfs->files, kName, static_cast<int>(xml.size())) != 0) {
-    throw InputError(where, "the model does not fit into memory");
+    throw InputError(where, "the model does not fit into memory", "use a smaller model or free some memory");
   }
   std::memcpy(vfs->files.filedata[mj_findFileVFS(&vfs->files, kName)], xml.data(), xml.size());
   std::array<char, 1000> message{};

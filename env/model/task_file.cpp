@@ -12,6 +12,7 @@
 #include "feeler/env/model/mujoco_handles.h"
 #include "feeler/env/model/overlap_judge.h"
 #include "feeler/env/model/task_fields.h"
+#include "feeler/env/model/task_inputs.h"
 #include "feeler/env/model/task_xml.h"
 
 namespace feeler::env {
@@ -33,7 +34,8 @@ int FindBody(const mjModel& model, const char* name, const std::string& where) {
                      "a task has one body `tool` and one body `target`");
   }
   if (model.body_parentid[body] != 0) {
-    throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "is not a child of <worldbody>");
+    throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "is not a child of <worldbody>",
+                     "move it there");
   }
   return body;
 }
@@ -62,7 +64,8 @@ void SortGeoms(TaskModel& task_model, const std::string& where) {
   }
   for (const auto& [geoms, name] : {std::pair{&task_model.tool_geoms, "tool"}, {&task_model.target_geoms, "target"}}) {
     if (geoms->empty()) {
-      throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "has no geom that can collide");
+      throw InputError(fmt::format("{}: <body name=\"{}\">", where, name), "has no geom that can collide",
+                       "give one geom a contype and a conaffinity of 1");
     }
   }
 }
@@ -175,19 +178,42 @@ TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, con
   return task_model;
 }
 
+namespace {
+
+bool IsPath(const std::string& task) { return task.find('/') != std::string::npos || task.ends_with(".xml"); }
+
+}  // namespace
+
+fs::path FileOfTask(const std::string& task) {
+  if (!IsPath(task)) return ModelsFolder() / "tasks" / (task + ".xml");
+  const fs::path file(task);
+  return file.has_parent_path() ? file : fs::path(".") / file;
+}
+
+std::vector<std::string> FilesOfTask(const std::string& task) {
+  const fs::path file = FileOfTask(task);
+  std::vector<std::string> files = FilesOfMjcf(ReadTextFile(file), file.string(), file.parent_path());
+  files.push_back(file.string());
+  return files;
+}
+
 TaskModel LoadTask(const std::string& task) {
-  const bool is_path = task.find('/') != std::string::npos || task.ends_with(".xml");
-  const fs::path file = is_path ? fs::path(task) : ModelsFolder() / "tasks" / (task + ".xml");
-  if (!fs::is_regular_file(file)) {
+  const bool is_path = IsPath(task);
+  const fs::path file = FileOfTask(task);
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) {
     std::string known;
     for (const std::string& name : ListTasks()) known += " " + name;
+    const bool missing = !error || error == std::errc::no_such_file_or_directory;
+    if (!missing) throw InputError(task, "cannot be read: " + error.message(), "check the name and the permissions");
     throw InputError(is_path ? task : "task " + task, "no such task",
                      is_path
                          ? "give a task's name or the path of a task file"
                          : "tasks are:" + (known.empty() ? " none in " + (ModelsFolder() / "tasks").string() : known));
   }
   TaskModel task_model = LoadTaskFromText(ReadTextFile(file), file.lexically_normal().string(), file.parent_path());
-  task_model.file = fs::absolute(file).lexically_normal();
+  task_model.file = fs::absolute(file, error).lexically_normal();
+  if (error) throw InputError(task, "cannot be located: " + error.message(), "change to another folder");
   task_model.task.file = task_model.file.string();
   return task_model;
 }

@@ -2,13 +2,16 @@
 
 #include <tinyxml2.h>
 
+#include <array>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <set>
 #include <sstream>
+#include <system_error>
 
 #include "feeler/core/error.h"
+#include "feeler/env/model/task_inputs.h"
 
 namespace feeler::env {
 namespace {
@@ -18,10 +21,13 @@ namespace fs = std::filesystem;
 void Parse(const std::string& text, const std::string& name, tinyxml2::XMLDocument& document) {
   document.Parse(text.c_str(), text.size());
   if (document.Error()) {
-    throw InputError(name, "malformed XML in line " + std::to_string(document.ErrorLineNum()) + ": " +
-                               tinyxml2::XMLDocument::ErrorIDToName(document.ErrorID()));
+    throw InputError(name,
+                     "malformed XML in line " + std::to_string(document.ErrorLineNum()) + ": " +
+                         tinyxml2::XMLDocument::ErrorIDToName(document.ErrorID()),
+                     "correct it");
   }
-  if (document.RootElement() == nullptr) throw InputError(name, "the file is empty");
+  if (document.RootElement() == nullptr)
+    throw InputError(name, "the file is empty", "give a task file (docs/task-file.md)");
 }
 
 class Includer {
@@ -41,16 +47,22 @@ class Includer {
     }
   }
 
+  const std::set<std::string>& included() const { return included_; }
+
  private:
   void Splice(tinyxml2::XMLElement& parent, tinyxml2::XMLElement& include, const std::string& name) {
     const char* attribute = include.Attribute("file");
     const std::string where = name + ": <include> in line " + std::to_string(include.GetLineNum());
-    if (attribute == nullptr) throw InputError(where, "attribute file is missing");
+    if (attribute == nullptr) throw InputError(where, "attribute file is missing", "name the file to include");
     const fs::path file = (fs::path(attribute).is_absolute() ? fs::path(attribute) : folder_ / attribute);
-    if (!included_.insert(fs::weakly_canonical(file).string()).second) {
+    std::error_code error;
+    fs::path canonical = fs::weakly_canonical(file, error);
+    if (error) throw InputError(where, file.string() + ": " + error.message(), "check the name and the permissions");
+    if (!included_.insert(canonical.string()).second) {
       throw InputError(where, "file " + std::string(attribute) + " is included twice", "MJCF allows it once");
     }
-    if (!fs::is_regular_file(file)) throw InputError(where, "no file " + file.lexically_normal().string());
+    if (!fs::is_regular_file(file, error))
+      throw InputError(where, "no file " + file.lexically_normal().string(), "check the name");
     tinyxml2::XMLDocument part;
     const std::string part_name = file.lexically_normal().string();
     Parse(ReadTextFile(file), part_name, part);
@@ -64,8 +76,11 @@ class Includer {
 
   fs::path folder_;
   tinyxml2::XMLDocument& document_;
-  std::set<std::string> included_;
+  std::set<std::string> included_;  // canonical
 };
+
+constexpr std::array<const char*, 7> kFileAttributes{"file",     "fileright", "fileleft", "fileup",
+                                                     "filedown", "filefront", "fileback"};
 
 /// MuJoCo looks for meshes and height fields in meshdir, for textures in texturedir, both relative to the main file.
 void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const fs::path& folder) {
@@ -82,7 +97,7 @@ void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const fs::path& folder) 
        assets = assets->NextSiblingElement("asset")) {
     for (auto* asset = assets->FirstChildElement(); asset != nullptr; asset = asset->NextSiblingElement()) {
       const bool texture = std::strcmp(asset->Name(), "texture") == 0;
-      for (const char* key : {"file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"}) {
+      for (const char* key : kFileAttributes) {
         const char* file = asset->Attribute(key);
         if (file == nullptr) continue;
         asset->SetAttribute(key, ((texture ? texture_folder : mesh_folder) / file).lexically_normal().c_str());
@@ -95,26 +110,57 @@ void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const fs::path& folder) 
 
 std::string ReadTextFile(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in || fs::is_directory(file)) throw InputError(file.string(), "cannot be read");
+  std::error_code error;
+  if (!in || fs::is_directory(file, error))
+    throw InputError(file.string(), "cannot be read", "check the name and the permissions");
   std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  if (in.bad()) throw InputError(file.string(), "cannot be read");
+  if (in.bad()) throw InputError(file.string(), "cannot be read", "check the name and the permissions");
   return text;
 }
 
-std::string ResolveMjcf(const std::string& mjcf, const std::string& name, const fs::path& folder) {
-  tinyxml2::XMLDocument document;
+namespace {
+
+/// Includes spliced in, asset files absolute; the files that were included.
+std::set<std::string> Resolve(const std::string& mjcf, const std::string& name, const fs::path& folder,
+                              tinyxml2::XMLDocument& document) {
   Parse(mjcf, name, document);
   tinyxml2::XMLElement& root = *document.RootElement();
   if (std::strcmp(root.Name(), "mujoco") != 0) {
     throw InputError(name, "the root element is <" + std::string(root.Name()) + ">",
                      "a task file is MJCF: <mujoco> ... </mujoco>");
   }
-  const fs::path absolute = fs::absolute(folder).lexically_normal();
-  Includer(absolute, document).Resolve(root, name);
+  std::error_code error;
+  const fs::path absolute = fs::absolute(folder, error).lexically_normal();
+  if (error) throw InputError(name, "its folder is not to be found: " + error.message(), "change to another folder");
+  Includer includer(absolute, document);
+  includer.Resolve(root, name);
   MakeAssetFilesAbsolute(root, absolute);
+  return includer.included();
+}
+
+}  // namespace
+
+std::string ResolveMjcf(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+  tinyxml2::XMLDocument document;
+  Resolve(mjcf, name, folder, document);
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
   return printer.CStr();
+}
+
+std::vector<std::string> FilesOfMjcf(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+  tinyxml2::XMLDocument document;
+  const std::set<std::string> included = Resolve(mjcf, name, folder, document);
+  std::vector<std::string> files(included.begin(), included.end());
+  for (auto* assets = document.RootElement()->FirstChildElement("asset"); assets != nullptr;
+       assets = assets->NextSiblingElement("asset")) {
+    for (auto* asset = assets->FirstChildElement(); asset != nullptr; asset = asset->NextSiblingElement()) {
+      for (const char* key : kFileAttributes) {
+        if (const char* file = asset->Attribute(key)) files.emplace_back(file);
+      }
+    }
+  }
+  return files;
 }
 
 }  // namespace feeler::env

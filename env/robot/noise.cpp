@@ -22,8 +22,10 @@ void NoiseOptions::Validate() const {
       throw InputError("noise " + name, fmt::format("{} is {}", field, value), "give a finite number, zero or more");
     }
   }
-  if (!joint_friction_nm.allFinite()) throw InputError("noise " + name, "joint_friction_nm is not finite");
-  if (!force_offset_n.allFinite()) throw InputError("noise " + name, "force_offset_n is not finite");
+  if (!joint_friction_nm.allFinite())
+    throw InputError("noise " + name, "joint_friction_nm is not finite", "give a finite number");
+  if (!force_offset_n.allFinite())
+    throw InputError("noise " + name, "force_offset_n is not finite", "give a finite number");
   if (!(std::abs(payload_error_kg) <= 10.0)) {
     throw InputError("noise " + name, fmt::format("payload_error_kg is {}", payload_error_kg), "give at most 10 kg");
   }

@@ -22,7 +22,7 @@ void RequirePositive(double value, const char* where, const char* what) {
 }
 
 void RequirePose(const Pose& pose, const char* where) {
-  if (!pose.matrix().allFinite()) throw InputError(where, "the pose is not finite");
+  if (!pose.matrix().allFinite()) throw InputError(where, "the pose is not finite", "give finite numbers");
   const Eigen::Matrix3d r = pose.linear();
   if (!(r.transpose() * r).isIdentity(1e-6) || r.determinant() < 0) {
     throw InputError(where, "the pose's rotation is not a rotation", "give an orthonormal right-handed matrix");
@@ -327,7 +327,7 @@ MotionResult SimulatedRobot::FollowLine(const PoseTrajectory& wanted, const Watc
 MotionResult SimulatedRobot::Guarded(const GuardedMotion& motion) {
   const double length = motion.direction.norm();
   if (!motion.direction.allFinite() || std::abs(length - 1.0) > 1e-6) {
-    throw InputError("guarded move", "the direction is not a unit vector");
+    throw InputError("guarded move", "the direction is not a unit vector", "normalise it");
   }
   if (!(motion.distance_m >= 0) || !std::isfinite(motion.distance_m)) {
     throw InputError("guarded move", fmt::format("the distance is {} m", motion.distance_m), "give zero or more");
@@ -486,7 +486,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
 MotionResult SimulatedRobot::FollowTwist(const TwistMotion& motion) {
   RequirePose(motion.tool_T_frame, "twist");
   if (!motion.linear_m_s.allFinite() || !motion.angular_rad_s.allFinite()) {
-    throw InputError("twist", "the velocity is not finite");
+    throw InputError("twist", "the velocity is not finite", "give finite numbers");
   }
   RequirePositive(motion.duration_s, "twist", "the duration (s)");
   RequirePositive(motion.contact_force_n, "twist", "the contact force (N)");

@@ -58,7 +58,7 @@ std::optional<JointReference> SimulatedRobot::Advance(const Vector6& wanted, Twi
 }
 
 MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const ImpedanceGains& gains) {
-  if (!delta.allFinite()) throw InputError("servo", "the step of the set point is not finite");
+  if (!delta.allFinite()) throw InputError("servo", "the step of the set point is not finite", "give finite numbers");
   if (steps < 1) throw InputError("servo", fmt::format("{} steps", steps), "give one or more");
   return Guard([&] {
     constexpr double kLeash_m = 0.02;

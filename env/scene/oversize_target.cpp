@@ -37,7 +37,7 @@ bool Overlap(const Box& a, const Box& b) {
 
 Scene WithOversizeTarget(const Scene& scene, double oversize_m) {
   if (!(oversize_m >= 0.0) || !std::isfinite(oversize_m)) {
-    throw InputError("oversize target", "the oversize is not a finite number of at least zero");
+    throw InputError("oversize target", "the oversize is not a finite number of at least zero", "give one");
   }
   ModelHandle model(mj_copyModel(nullptr, scene.model.get()));
   std::vector<Box> openings;

@@ -54,7 +54,8 @@ World::World(std::shared_ptr<const Scene> scene)
 
 void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const PhysicsVariation& variation) {
   if (!q_rad.allFinite()) throw InputError("reset", "joint position is not finite", "give six angles in radians");
-  if (!world_T_target.matrix().allFinite()) throw InputError("reset", "target pose is not finite");
+  if (!world_T_target.matrix().allFinite())
+    throw InputError("reset", "target pose is not finite", "give finite numbers");
   Vary(variation);
   failure_.clear();
   contacts_.clear();

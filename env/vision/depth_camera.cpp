@@ -47,8 +47,11 @@ DepthCamera::DepthCamera(std::shared_ptr<const Scene> scene, const DepthCameraOp
       drawn_(MakeData(*scene_->drawn_model)) {
   const mjModel& model = *scene_->drawn_model;
   camera_ = mj_name2id(&model, mjOBJ_CAMERA, options.camera.c_str());
-  if (camera_ < 0) throw InputError("depth camera", fmt::format("the scene has no camera '{}'", options.camera));
-  if (!(options.farthest_m > 0.0)) throw InputError("depth camera", "farthest_m is not above zero");
+  if (camera_ < 0)
+    throw InputError("depth camera", fmt::format("the scene has no camera '{}'", options.camera),
+                     "name a camera of the scene");
+  if (!(options.farthest_m > 0.0))
+    throw InputError("depth camera", "farthest_m is not above zero", "give a positive number");
   for (int geom = 0; geom < model.ngeom; ++geom) {
     geom_albedo_.push_back(static_cast<float>(AssumedAlbedo(model, geom)));
   }

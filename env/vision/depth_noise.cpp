@@ -62,7 +62,8 @@ void DepthNoiseOptions::Validate() const {
       throw InputError("depth noise", fmt::format("{} is {}", field, value), "give a finite number, zero or more");
     }
   }
-  if (!std::isfinite(bias_m) || !std::isfinite(bias_slope)) throw InputError("depth noise", "the bias is not finite");
+  if (!std::isfinite(bias_m) || !std::isfinite(bias_slope))
+    throw InputError("depth noise", "the bias is not finite", "give a finite number");
   if (quantisation && quantum_m <= 0.0) throw InputError("depth noise", "quantum_m is 0", "switch quantisation off");
   if (bias && wiggle_period_m <= 0.0) throw InputError("depth noise", "wiggle_period_m is 0", "give a period above 0");
 }

@@ -2,11 +2,8 @@
 
 #include <zlib.h>
 
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 
 namespace feeler::env {
 namespace {
@@ -60,19 +57,6 @@ std::string EncodePng(const Image& image) {
   return png;
 }
 
-void WritePng(const Image& image, const std::string& path) {
-  const std::string png = EncodePng(image);
-  const std::string part = path + ".part";
-  std::ofstream out(part, std::ios::binary);
-  out.write(png.data(), static_cast<std::streamsize>(png.size()));
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(part, path, error);
-  if (!out || error) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    throw InputError(path, "cannot write the image", "give a writable path in an existing folder");
-  }
-}
+void WritePng(const Image& image, const std::string& path) { WriteFileAtomically(path, EncodePng(image)); }
 
 }  // namespace feeler::env

@@ -171,7 +171,8 @@ std::vector<Placed> DrawnGeoms(const TaskModel& task_model) {
 }  // namespace
 
 TargetPoints SampleTargetSurface(const TaskModel& task_model, double spacing_m) {
-  if (!(spacing_m > 0.0)) throw InputError("surface of the target", "the spacing is not positive");
+  if (!(spacing_m > 0.0))
+    throw InputError("surface of the target", "the spacing is not positive", "give a positive number");
   const mjModel& model = *task_model.model;
   const std::vector<Placed> placed = DrawnGeoms(task_model);
   TargetPoints surface;

@@ -12,8 +12,11 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <system_error>
 #include <vector>
 
 #include "feeler/core/error.h"
@@ -27,7 +30,7 @@ class VideoWriter::Process {
     // A socket instead of a pipe: writing to a child that has died is then an error, not a signal to this process.
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
-      throw InputError("video", std::string("no socket: ") + std::strerror(errno));
+      throw InputError("video", std::string("no socket: ") + std::strerror(errno), "free some descriptors or memory");
     }
     input_ = ends[0];
     complaints_ = std::tmpfile();
@@ -125,20 +128,35 @@ class VideoWriter::Process {
   std::FILE* complaints_ = nullptr;
 };
 
+namespace {
+
+/// A new empty file of our own for an encoder to write to.
+std::string TemporaryFile() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error) folder = "/tmp";
+  std::string name = (folder / "feeler-video-XXXXXX").string();
+  const int descriptor = mkstemp(name.data());
+  if (descriptor < 0) {
+    throw InputError(folder.string(), std::string("cannot write the video: ") + std::strerror(errno),
+                     "set TMPDIR to a folder where you may write");
+  }
+  close(descriptor);
+  return name;
+}
+
+}  // namespace
+
 VideoWriter::VideoWriter(const std::string& path, const VideoOptions& options) : path_(path), options_(options) {
   if (options.width < 2 || options.height < 2 || options.width % 2 != 0 || options.height % 2 != 0 ||
       options.frames_per_second < 1 || options.quality < 0 || options.quality > 51) {
     throw InputError("video", "size, rate or quality out of range",
                      "even width and height, frames_per_second >= 1, quality 0 to 51");
   }
-  // Not by the name's ending, which is ours: the format is said below. The folder must be there before we render.
-  part_ = path + ".part";
-  std::FILE* probe = std::fopen(part_.c_str(), "wb");
-  if (probe == nullptr) {
-    throw InputError(path, std::string("cannot write the video: ") + std::strerror(errno),
-                     "give a writable path in an existing folder");
-  }
-  std::fclose(probe);
+  // The place must be there before we render. What is not a regular file takes the video at the end: an encoder goes
+  // back in what it writes.
+  output_ = std::make_unique<OutputFile>(path);
+  part_ = output_->direct() ? TemporaryFile() : output_->part();
   // A path may begin with a dash; with a protocol in front ffmpeg takes it for nothing but a file.
   try {
     process_ =
@@ -173,15 +191,20 @@ VideoWriter::VideoWriter(const std::string& path, const VideoOptions& options) :
                                                            "mp4",
                                                            "file:" + part_});
   } catch (...) {
-    std::remove(part_.c_str());
+    RemovePart();
     throw;
   }
+}
+
+void VideoWriter::RemovePart() {
+  if (output_ && output_->direct()) std::remove(part_.c_str());
+  output_.reset();  // takes its part away
 }
 
 VideoWriter::~VideoWriter() {
   if (!process_) return;
   process_.reset();
-  std::remove(part_.c_str());
+  RemovePart();
 }
 
 void VideoWriter::Add(const Image& frame) {
@@ -201,13 +224,20 @@ void VideoWriter::Finish() {
   const bool good = process_->Finish();
   const std::string complaint = process_->Complaint();
   process_.reset();
-  std::error_code error;
-  if (good && frames_ > 0) std::filesystem::rename(part_, path_, error);
-  if (!good || frames_ == 0 || error) {
-    std::remove(part_.c_str());
+  if (!good || frames_ == 0) {
+    RemovePart();
     throw InputError(path_, frames_ == 0 ? "a video without frames" : "the video was not written: " + complaint,
                      "check disk space and the ffmpeg installation");
   }
+  if (output_->direct()) {
+    std::ifstream in(part_, std::ios::binary);
+    std::vector<char> chunk(1 << 16);
+    while (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || in.gcount() > 0) {
+      output_->Write({chunk.data(), static_cast<std::size_t>(in.gcount())});
+    }
+    std::remove(part_.c_str());
+  }
+  output_->Commit();
 }
 
 }  // namespace feeler::env

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "feeler/core/file_output.h"
 #include "feeler/env/vision/image.h"
 
 namespace feeler::env {
@@ -36,9 +37,12 @@ class VideoWriter {
 
  private:
   class Process;
+  void RemovePart();
+
   std::string path_;
   std::string part_;
   VideoOptions options_;
+  std::unique_ptr<OutputFile> output_;
   std::unique_ptr<Process> process_;
   std::int64_t frames_ = 0;
 };

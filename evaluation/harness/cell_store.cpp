@@ -2,20 +2,23 @@
 
 #include <filesystem>
 #include <fstream>
+#include <system_error>
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 
 namespace feeler::evaluation {
 
 using nlohmann::json;
 
 CellStore::CellStore(std::string path, const json& settings) : path_(std::move(path)) {
-  const bool fresh = !std::filesystem::exists(path_) || std::filesystem::file_size(path_) == 0;
+  std::error_code error;
+  const bool fresh = !std::filesystem::exists(path_, error) || std::filesystem::file_size(path_, error) == 0;
   if (!fresh) Read(settings);
   file_ = std::fopen(path_.c_str(), "ab");
   if (file_ == nullptr) throw InputError(path_, "cannot be written", "choose another folder");
-  if (fresh || std::filesystem::file_size(path_) == 0) WriteLine({{"settings", settings}});
+  if (fresh || std::filesystem::file_size(path_, error) == 0) WriteLine({{"settings", settings}});
 }
 
 CellStore::~CellStore() {
@@ -23,7 +26,7 @@ CellStore::~CellStore() {
 }
 
 void CellStore::Read(const json& settings) {
-  const std::string other = "delete it or choose another folder";
+  const std::string other = "choose another folder, or move this file away";
   std::string text;
   {
     std::ifstream in(path_, std::ios::binary);
@@ -36,8 +39,8 @@ void CellStore::Read(const json& settings) {
     const std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) break;  // cut off while it was written
     ++number;
-    const json line = json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
-                                  text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    const std::string_view bytes = std::string_view(text).substr(begin, end - begin);
+    const json line = IsNestedDeeper(bytes) ? json() : json::parse(bytes, nullptr, false);
     const bool header = number == 1;
     const bool valid =
         line.is_object() && (header ? line.contains("settings")
@@ -49,7 +52,9 @@ void CellStore::Read(const json& settings) {
     if (!header) cells_.insert_or_assign(line["cell"].get<std::string>(), line["value"]);
     begin = end + 1;
   }
-  if (begin < text.size()) std::filesystem::resize_file(path_, begin);
+  std::error_code error;
+  if (begin < text.size()) std::filesystem::resize_file(path_, begin, error);
+  if (error) throw InputError(path_, "cannot be written: " + error.message(), "check its permissions");
 }
 
 const json* CellStore::Find(const std::string& cell) const {

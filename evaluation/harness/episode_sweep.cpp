@@ -5,9 +5,11 @@
 #include <fstream>
 #include <memory>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/evaluation/harness/cell_store.h"
 #include "feeler/evaluation/records/episode_json.h"
 #include "feeler/evaluation/records/scene_geometry.h"
@@ -37,17 +39,19 @@ std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& se
   while (begin < text.size()) {
     const std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) break;
-    json record = json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
-                              text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    const std::string_view bytes = std::string_view(text).substr(begin, end - begin);
+    json record = IsNestedDeeper(bytes) ? json() : json::parse(bytes, nullptr, false);
     const auto is = [&](const char* key, const json& value) { return record.contains(key) && record[key] == value; };
     if (!record.is_object() || !is("episode", records.size()) || !is("seed", seed) || !is("noise", noise)) {
       throw InputError(path + " line " + std::to_string(records.size() + 1), "is not the record expected there",
-                       "delete the folder of the experiment, or choose another");
+                       "choose another folder, or move this one away");
     }
     records.push_back(std::move(record));
     begin = end + 1;
   }
-  if (begin < text.size()) std::filesystem::resize_file(path, begin);
+  std::error_code error;
+  if (begin < text.size()) std::filesystem::resize_file(path, begin, error);
+  if (error) throw InputError(path, "cannot be written: " + error.message(), "check its permissions");
   return records;
 }
 
@@ -153,8 +157,11 @@ bool EpisodeSweep::Run() {
     const std::pair group{setting.task, setting.cost};
     if (std::find(groups.begin(), groups.end(), group) == groups.end()) groups.push_back(group);
   }
-  std::filesystem::create_directories(request_.out + "/" + experiment_);
-  std::filesystem::create_directories(request_.out + "/databases");
+  for (const std::string& folder : {request_.out + "/" + experiment_, request_.out + "/databases"}) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw InputError(folder, "cannot be created: " + error.message(), "choose another folder");
+  }
   // Refuses a folder that was begun under other settings.
   const CellStore store(PartialFile(request_, experiment_), SettingsJson());
   std::int64_t done = 0;

@@ -82,8 +82,10 @@ void WriteExperiment(const std::string& folder, const std::string& name, const R
                      const nlohmann::json& details, const Manifest& manifest, const std::vector<Figure>& figures) {
   for (const auto& row : table.rows) {
     if (row.size() != table.columns.size()) {
-      throw InputError("experiment " + name, "a row has " + std::to_string(row.size()) + " cells for " +
-                                                 std::to_string(table.columns.size()) + " columns");
+      throw InputError(
+          "experiment " + name,
+          "a row has " + std::to_string(row.size()) + " cells for " + std::to_string(table.columns.size()) + " columns",
+          "give one cell a column");
     }
   }
   std::error_code error;

@@ -87,7 +87,9 @@ std::vector<json> WriteVisualServoingPictures(const VisualServoingRow& row, cons
   const std::string stem = row.setting.task + (tape ? "-tape" : "-sift");
   std::error_code error;
   std::filesystem::create_directories(request.out + "/" + folder, error);
-  if (error) throw InputError(request.out + "/" + folder, "cannot be created: " + error.message());
+  if (error)
+    throw InputError(request.out + "/" + folder, "cannot be created: " + error.message(),
+                     "choose a folder where you may write");
   env::WritePng(ImageOf(goal->view), request.out + "/" + folder + stem + "-goal.png");
   env::WritePng(seen, request.out + "/" + folder + stem + "-start.png");
   const std::string what = fmt::format("{}, {}", row.scene, row.features);

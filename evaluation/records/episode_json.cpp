@@ -1,9 +1,12 @@
 #include "feeler/evaluation/records/episode_json.h"
 
+#include <fmt/format.h>
+
 #include <fstream>
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/evaluation/records/replay_json.h"
 
 namespace feeler::evaluation {
@@ -118,6 +121,8 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
     ++number;
     if (line.empty()) continue;
     try {
+      if (IsNestedDeeper(line))
+        throw InputError(fmt::format("{} line {}", path, number), "is nested too deep", "run the episode again");
       const auto json = nlohmann::json::parse(line);
       std::vector<std::string> rungs;
       for (const auto& rung : json.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());

@@ -11,7 +11,7 @@
 namespace feeler::evaluation {
 
 Rate WilsonRate(int successes, int trials) {
-  if (successes < 0 || successes > trials) throw InputError("rate", "successes must lie in 0..trials");
+  if (successes < 0 || successes > trials) throw InputError("rate", "successes must lie in 0..trials", "count again");
   Rate rate{successes, trials, 0.0, 0.0, 1.0};
   if (trials == 0) return rate;
   constexpr double kZ = 1.959963984540054;  // 97.5 % quantile of the standard normal
@@ -71,7 +71,8 @@ Estimate BootstrapMean(const std::vector<double>& values) {
 }
 
 Estimate BootstrapRatio(const std::vector<double>& numerators, const std::vector<double>& denominators) {
-  if (numerators.size() != denominators.size()) throw InputError("ratio", "the values are not paired");
+  if (numerators.size() != denominators.size())
+    throw InputError("ratio", "the values are not paired", "give two lists of one length");
   return Bootstrap(numerators.size(), [&](const std::vector<std::size_t>& indices) {
     const double below = SumAt(denominators, indices);
     return below > 0.0 ? SumAt(numerators, indices) / below : 0.0;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "feeler/core/captured_stderr.h"
 #include "feeler/evaluation/records/replay_json.h"
 
 namespace feeler::evaluation {
@@ -19,7 +20,13 @@ std::string PictureDataUrl(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return "";
   std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
-  const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  cv::Mat image;
+  try {
+    const CapturedStderr captured;  // what the decoders think of a damaged picture: its caller says it is none
+    image = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  } catch (const cv::Exception&) {
+    return "";
+  }
   if (image.empty()) return "";
   if (bytes.size() <= kLargest) return std::string("data:image/") + (png ? "png" : "jpeg") + ";base64," + Base64(bytes);
   cv::Mat smaller = image;

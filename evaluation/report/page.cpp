@@ -60,7 +60,8 @@ std::string DataElement(const char* id, const std::string& content) {
 }
 
 std::string Script(const std::string& code) {
-  if (code.find("</script") != std::string::npos) throw InputError("report", "a script holds an end of script");
+  if (code.find("</script") != std::string::npos)
+    throw InputError("report", "a script holds an end of script", "break the word in two");
   return "<script>\n" + code + "\n</script>\n";
 }
 
@@ -91,7 +92,7 @@ json ExperimentJson(const ReportedExperiment& experiment) {
 /// Puts `content` in the place of `mark`, which stands in the template once.
 void Fill(std::string& page, const std::string& mark, const std::string& content) {
   const std::size_t at = page.find(mark);
-  if (at == std::string::npos) throw InputError("page.html", "has no " + mark);
+  if (at == std::string::npos) throw InputError("page.html", "has no " + mark, "restore the page from the sources");
   page.replace(at, mark.size(), content);
 }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "feeler/core/json_depth.h"
+
 namespace feeler::evaluation {
 namespace {
 
@@ -124,6 +126,7 @@ std::string ReplayLine(const json& record) {
 }  // namespace
 
 ReportedEpisode ReadRecordLine(const std::string& line, json& record) {
+  if (IsNestedDeeper(line)) Refuse("is nested too deep");
   record = json::parse(line, nullptr, false);
   if (record.is_discarded()) Refuse("is cut off, or no JSON");
   if (!record.is_object()) Refuse("is no JSON object");

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/evaluation/harness/experiment_output.h"
 #include "feeler/evaluation/report/embedded_picture.h"
 #include "feeler/evaluation/report/record_line.h"
@@ -22,6 +23,11 @@ namespace fs = std::filesystem;
 std::string Slurp(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Discarded if it is no JSON, or nested deeper than anything of ours.
+json Parse(const std::string& text) {
+  return IsNestedDeeper(text) ? json(json::value_t::discarded) : json::parse(text, nullptr, false);
 }
 
 class FolderReader {
@@ -46,7 +52,7 @@ class FolderReader {
         ReadRecords(file);
       } else if (name.ends_with(".json") && name != "manifest.json") {
         ReadExperiment(file);
-      } else if (name.ends_with(".csv") && !fs::exists(fs::path(file).replace_extension(".json"))) {
+      } else if (name.ends_with(".csv") && !fs::exists(fs::path(file).replace_extension(".json"), error)) {
         Add(Relative(file), "stands without " + file.stem().string() + ".json", "run the experiment again");
       }
     }
@@ -61,7 +67,7 @@ class FolderReader {
   }
 
   json ParseFile(const fs::path& file) {
-    json document = json::parse(Slurp(file), nullptr, false);
+    json document = Parse(Slurp(file));
     if (document.is_discarded()) {
       Add(Relative(file), "is cut off, or no JSON", "run what wrote it again");
       return nullptr;
@@ -76,7 +82,7 @@ class FolderReader {
       if (!scene.is_object() || !scene.contains(key) || !scene[key].is_array() || !scene.contains("task") ||
           !scene["task"].is_string()) {
         return Add(Relative(file), std::string("is no scene: no \"") + key + "\" or no \"task\"",
-                   "run the episodes again, or delete it");
+                   "run the episodes again, or move it away");
       }
     }
     const std::string task = scene["task"].get<std::string>();
@@ -112,15 +118,16 @@ class FolderReader {
         Add(where, fault.what(), "remove the line, or run the episode again");
       }
     }
-    if (number == 0) Add(records.file, "holds no episode", "run the episodes again, or delete it");
+    if (number == 0) Add(records.file, "holds no episode", "run the episodes again, or move it away");
     if (!records.episodes.empty()) results_.records.push_back(std::move(records));
   }
 
   void ReadExperiment(const fs::path& file) {
     const fs::path csv = fs::path(file).replace_extension(".csv");
-    const bool has_csv = fs::exists(csv);
+    std::error_code error;
+    const bool has_csv = fs::exists(csv, error);
     const std::string text = Slurp(file);
-    json document = json::parse(text, nullptr, false);
+    json document = Parse(text);
     if (document.is_discarded()) {
       // A cut-off file is somebody's result if a table stands beside it; else it may be anything.
       return Add(Relative(file), "is cut off, or no JSON", "run what wrote it again");
@@ -168,8 +175,9 @@ class FolderReader {
       return details.is_object() && details.contains(key) ? details.at(key) : json();
     };
     experiment.manifest = find("manifest");
+    std::error_code error;
     if (const fs::path beside = file.parent_path() / "manifest.json";
-        experiment.manifest.is_null() && fs::exists(beside)) {
+        experiment.manifest.is_null() && fs::exists(beside, error)) {
       experiment.manifest = ParseFile(beside);
     }
     if (!experiment.manifest.is_object()) {
@@ -247,10 +255,15 @@ class FolderReader {
 std::string ToString(const Fault& fault) { return fault.where + ": " + fault.what + " (" + fault.mend + ")"; }
 
 Results ReadResults(const std::string& folder) {
-  if (!fs::exists(folder)) {
+  std::error_code error;
+  const fs::file_status status = fs::status(folder, error);
+  if (error && status.type() != fs::file_type::not_found) {
+    throw InputError(folder, "cannot be read: " + error.message(), "check the name and the permissions");
+  }
+  if (!fs::exists(status)) {
     throw InputError(folder, "there is no such folder", "give the --out of feeler experiment, or a folder of records");
   }
-  if (!fs::is_directory(folder)) throw InputError(folder, "is a file", "give the folder that it is in");
+  if (!fs::is_directory(status)) throw InputError(folder, "is a file", "give the folder that it is in");
   Results results = FolderReader(folder).Read();
   if (results.experiments.empty() && results.records.empty()) {
     std::string what = "holds neither an experiment nor a record of an episode";

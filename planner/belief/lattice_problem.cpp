@@ -61,8 +61,8 @@ Problem MakeLatticeProblem(const LatticeProblemData& data) {
   const std::string where = data.name.empty() ? "lattice problem" : "lattice problem " + data.name;
   if ((data.size.array() <= 0).any())
     throw InputError(where, "size is not positive", "give three counts of at least 1");
-  if (data.tool.empty()) throw InputError(where, "the tool has no cells");
-  if (data.target.empty()) throw InputError(where, "the target has no cells");
+  if (data.tool.empty()) throw InputError(where, "the tool has no cells", "give at least one");
+  if (data.target.empty()) throw InputError(where, "the target has no cells", "give at least one");
   if (data.hypotheses.empty()) throw InputError(where, "no hypotheses", "give at least one");
   constexpr int kMostOffset = 100000;
   for (const Hypothesis& h : data.hypotheses) {
@@ -74,7 +74,8 @@ Problem MakeLatticeProblem(const LatticeProblemData& data) {
     throw InputError(where, "size or hypotheses out of range", fmt::format("at most {} cells", kMostOffset));
   }
   const CellBox workspace{Cell::Zero(), data.size - Cell::Ones()};
-  if (!workspace.Contains(data.start)) throw InputError(where, "the start lies outside the size");
+  if (!workspace.Contains(data.start))
+    throw InputError(where, "the start lies outside the size", "start inside the size");
   const CellBox domain{workspace.min - high, workspace.max - low};
   if (domain.Count() > kMostDisplacements) {
     throw InputError(where, fmt::format("{} displacements of the tool are too many", domain.Count()),

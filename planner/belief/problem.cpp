@@ -29,11 +29,13 @@ void ValidateHypotheses(const Problem& problem) {
       throw InputError(where, fmt::format("hypothesis {} has weight {}", i, h.weight), "weights are positive numbers");
     }
     if (h.orientation < 0 || h.orientation >= problem.map->orientations()) {
-      throw InputError(where, fmt::format("hypothesis {} has orientation {}, the contact map has {}", i, h.orientation,
-                                          problem.map->orientations()));
+      throw InputError(where,
+                       fmt::format("hypothesis {} has orientation {}, the contact map has {}", i, h.orientation,
+                                   problem.map->orientations()),
+                       "use an orientation of the map");
     }
     if (h.offset.cwiseAbs().maxCoeff() > 100000) {
-      throw InputError(where, fmt::format("hypothesis {} lies {} cells away", i, ToText(h.offset)));
+      throw InputError(where, fmt::format("hypothesis {} lies {} cells away", i, ToText(h.offset)), "move it nearer");
     }
     if (!seen.insert({h.offset.x(), h.offset.y(), h.offset.z(), h.orientation}).second) {
       throw InputError(where, fmt::format("hypothesis {} at {} is a duplicate", i, ToText(h.offset)), "list each once");
@@ -51,7 +53,7 @@ void ValidateHypotheses(const Problem& problem) {
 
 void Validate(const Problem& problem) {
   const std::string where = Where(problem);
-  if (!problem.map) throw InputError(where, "no contact map");
+  if (!problem.map) throw InputError(where, "no contact map", "give the map of the task");
   if (problem.move_lengths.empty()) throw InputError(where, "no move lengths", "list at least one, e.g. [1,2,4,8,16]");
   for (std::size_t i = 0; i < problem.move_lengths.size(); ++i) {
     const int length = problem.move_lengths[i];
@@ -70,9 +72,11 @@ void Validate(const Problem& problem) {
   if (problem.cost.per_cell + problem.cost.per_action <= 0.0) {
     throw InputError(where, "moves cost nothing", "give a cost per cell or per action");
   }
-  if ((problem.insertable_spread.array() < 0).any()) throw InputError(where, "negative insertable spread");
+  if ((problem.insertable_spread.array() < 0).any())
+    throw InputError(where, "negative insertable spread", "give cells of at least 0");
   if (!problem.workspace.Contains(problem.start)) {
-    throw InputError(where, fmt::format("the start {} lies outside the workspace", ToText(problem.start)));
+    throw InputError(where, fmt::format("the start {} lies outside the workspace", ToText(problem.start)),
+                     "move the start inside");
   }
   ValidateHypotheses(problem);
 }

@@ -15,11 +15,14 @@ ContactMap::ContactMap(CellBox domain, std::vector<Layer> layers, Eigen::Vector3
       phase_(std::move(phase)),
       margin_cells_(margin_cells) {
   const auto count = static_cast<std::size_t>(domain_.Count());
-  if (count == 0 || layers_.empty()) throw InputError("contact map", "empty domain or no orientation");
+  if (count == 0 || layers_.empty())
+    throw InputError("contact map", "empty domain or no orientation", "give a domain with cells and a layer");
   for (const Layer& layer : layers_) {
     bool fits = layer.blocked.size() == count;
     for (const auto& travel : layer.travel) fits = fits && travel.size() == count;
-    if (!fits) throw InputError("contact map", "a layer does not have one entry per displacement of the domain");
+    if (!fits)
+      throw InputError("contact map", "a layer does not have one entry per displacement of the domain",
+                       "give a layer of the domain's size");
   }
 }
 

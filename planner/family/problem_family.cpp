@@ -162,12 +162,14 @@ Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> ma
   Problem problem;
   problem.name = fmt::format("{} {}", task.name, ToString(extents, task));
   problem.map = std::move(map);
-  if (!problem.map) throw InputError(problem.name, "no contact map");
+  if (!problem.map) throw InputError(problem.name, "no contact map", "give the map of the task");
   const int yaws = LatticeAngles(task, AxisKind::kYaw);
   const int pitches = LatticeAngles(task, AxisKind::kPitch);
   if (problem.map->orientations() != yaws * pitches) {
-    throw InputError(problem.name, fmt::format("the contact map has {} orientations, the task {}",
-                                               problem.map->orientations(), yaws * pitches));
+    throw InputError(
+        problem.name,
+        fmt::format("the contact map has {} orientations, the task {}", problem.map->orientations(), yaws * pitches),
+        "build the map of this task");
   }
   if (extents.n_yaw > yaws || extents.n_pitch > pitches) {
     throw InputError(problem.name, fmt::format("the task has {} yaw and {} pitch angles", yaws, pitches),

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <set>
 #include <system_error>
@@ -50,33 +48,6 @@ std::string ReadTextFile(const std::string& path, std::size_t max_bytes) {
     }
   }
   return text;
-}
-
-void WriteTextFile(const std::string& path, std::string_view text) {
-  const auto fail = [&](int error) {
-    return InputError(path, "cannot be written: " + std::generic_category().message(error),
-                      "check that the folder exists, that you may write there and that the disk has room");
-  };
-  struct stat status {};
-  const bool exists = stat(path.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) throw fail(EISDIR);
-  // A pipe or a device (/dev/stdout) is written as it is: there is nothing to rename.
-  const bool direct = exists && !S_ISREG(status.st_mode);
-  const std::string name = direct ? path : fmt::format("{}.part{}", path, getpid());
-  std::FILE* file = std::fopen(name.c_str(), "wb");
-  if (file == nullptr) throw fail(errno);
-  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  const int write_error = errno;
-  if (std::fclose(file) != 0 || !written) {
-    const int error = written ? errno : write_error;
-    if (!direct) std::remove(name.c_str());
-    throw fail(error);
-  }
-  if (!direct && std::rename(name.c_str(), path.c_str()) != 0) {
-    const int error = errno;
-    std::remove(name.c_str());
-    throw fail(error);
-  }
 }
 
 json ParseJson(std::string_view text, const std::string& where, int max_depth) {

@@ -16,9 +16,6 @@ inline constexpr std::size_t kMaxTextFile = std::size_t{1} << 26;
 /// The file's bytes. Throws InputError if it cannot be read or is larger than `max_bytes`.
 std::string ReadTextFile(const std::string& path, std::size_t max_bytes = kMaxTextFile);
 
-/// Writes beside the path and renames, so that no half-written file ever stands there. Throws InputError.
-void WriteTextFile(const std::string& path, std::string_view text);
-
 /// Parses JSON, stricter than the library: no key twice in an object, at most `max_depth` levels. Throws InputError
 /// that names line and column.
 nlohmann::json ParseJson(std::string_view text, const std::string& where, int max_depth = 8);
@@ -48,7 +45,7 @@ class JsonField {
   /// A list of three whole numbers.
   Cell AsCell(int min, int max) const;
 
-  [[noreturn]] void Fail(const std::string& what, const std::string& mend = "") const;
+  [[noreturn]] void Fail(const std::string& what, const std::string& mend) const;
 
  private:
   JsonField(const nlohmann::json& value, const JsonField& parent, const char* key, std::size_t index)

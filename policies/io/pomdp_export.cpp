@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/solve.h"
 #include "feeler/policies/io/pomdp_model.h"
 
 namespace feeler::policies {
@@ -15,8 +16,32 @@ namespace {
 
 using fmt::format_to;
 
-// Both formats take up to about 60 bytes a step.
-constexpr std::size_t kMaxSteps = 6'000'000;
+/// Largest file that is written, and the steps beyond which it cannot be smaller (a step takes 40 bytes and more).
+constexpr std::size_t kMaxBytes = 400'000'000;
+constexpr std::size_t kMaxSteps = kMaxBytes / 40;
+
+/// To be asked while the text grows.
+void RequireSize(const planner::Problem& problem, const std::string& text) {
+  if (text.size() <= kMaxBytes) return;
+  throw InputError(problem.name.empty() ? "problem" : problem.name,
+                   fmt::format("takes more than {} MB", kMaxBytes / 1'000'000), "export a smaller problem");
+}
+
+/// A bound below the optimal cost would make wrong declarations pay: the exported problem would be another one.
+void RequireUpperBound(const planner::Problem& problem, double upper_bound) {
+  constexpr double kTolerance = 1e-9;  // relative: of sums in another order
+  constexpr std::int64_t kExpansions = 20'000;
+  planner::SolverOptions options = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
+  options.gap = 1.0;
+  options.expansion_limit = kExpansions;
+  const planner::SolverResult result = planner::Solve(problem, options);
+  if (result.status == planner::SolverStatus::kUnlocalizable) return;  // refused where the model is made
+  if (upper_bound >= result.lower_bound * (1.0 - kTolerance)) return;
+  throw InputError(
+      "upper bound",
+      fmt::format("{} is below the optimal cost, which is at least {:.6g}", upper_bound, result.lower_bound),
+      "give the expected cost of a complete policy (feeler solve)");
+}
 
 PomdpModel MakeModel(const planner::Problem& problem, const PomdpOptions& options) {
   if (!(options.discount > 0.0 && options.discount <= 1.0)) {
@@ -25,6 +50,7 @@ PomdpModel MakeModel(const planner::Problem& problem, const PomdpOptions& option
   if (!(options.upper_bound >= 0.0)) {
     throw InputError("upper bound", fmt::format("is {}", options.upper_bound), "give the cost of a policy");
   }
+  if (std::isfinite(options.upper_bound)) RequireUpperBound(problem, options.upper_bound);
   return MakePomdpModel(problem, options.upper_bound, kMaxSteps);
 }
 
@@ -40,7 +66,7 @@ std::string Comment(const planner::Problem& problem, const PomdpModel& model) {
   for (const char c : problem.name) name += c >= ' ' && c != '-' && c != '<' && c != '>' && c != '&' ? c : '_';
   return fmt::format(
       "{}: {} robot cells, {} hypotheses. Wrong declaration or move without room: {}. "
-      "The value is the least cost of a policy that reaches done",
+      "The negated value is the least cost of a policy that reaches done",
       name, model.cells.size(), model.prior.size(), Decimal(model.penalty));
 }
 
@@ -81,7 +107,7 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
   const auto state = [&](std::size_t r, std::size_t h) { return fmt::format("{}_h{}", cell_names[r], h); };
 
   format_to(out, "# {}\n", Comment(problem, model));
-  format_to(out, "discount: {}\nvalues: cost\nstates:", Decimal(options.discount));
+  format_to(out, "discount: {}\nvalues: reward\nstates:", Decimal(options.discount));
   for (std::size_t r = 0; r < cells; ++r) {
     for (std::size_t h = 0; h < hypotheses; ++h) format_to(out, " {}", state(r, h));
   }
@@ -99,10 +125,11 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     const std::string name = model.MoveName(m);
     for (std::size_t r = 0; r < cells; ++r) {
+      RequireSize(problem, text);
       for (std::size_t h = 0; h < hypotheses; ++h) {
         const PomdpModel::Step& step = model.At(m, r, h);
         format_to(out, "T: {} : {} : {} 1.0\n", name, state(r, h), state(static_cast<std::size_t>(step.cell), h));
-        if (step.cost != 0.0) format_to(out, "R: {} : {} : * : * {}\n", name, state(r, h), Decimal(step.cost));
+        if (step.cost != 0.0) format_to(out, "R: {} : {} : * : * {}\n", name, state(r, h), Decimal(-step.cost));
       }
     }
     format_to(out, "T: {} : done : done 1.0\n", name);
@@ -111,9 +138,10 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
     const std::string name = model.DeclarationName(d);
     format_to(out, "T: {} : * : done 1.0\n", name);
     for (std::size_t r = 0; r < cells; ++r) {
+      RequireSize(problem, text);
       for (std::size_t h = 0; h < hypotheses; ++h) {
         if (Contains(model.declarations[d], h)) continue;
-        format_to(out, "R: {} : {} : * : * {}\n", name, state(r, h), Decimal(model.penalty));
+        format_to(out, "R: {} : {} : * : * {}\n", name, state(r, h), Decimal(-model.penalty));
       }
     }
   }
@@ -121,6 +149,7 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
     for (std::size_t h = 0; h < hypotheses; ++h) format_to(out, "O: * : {} : {} 1.0\n", state(r, h), cell_names[r]);
   }
   text += "O: * : done : end 1.0\n";
+  RequireSize(problem, text);
   return text;
 }
 
@@ -173,6 +202,7 @@ std::string FormatPomdpx(const planner::Problem& problem, const PomdpOptions& op
   text += Entry("* done * done", "ProbTable", "1.0");
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     for (std::size_t r = 0; r < cells; ++r) {
+      RequireSize(problem, text);
       ForEachDistinct(
           hypotheses, [&](std::size_t h) { return model.At(m, r, h).cell; },
           [&](const std::string& h, int next) {
@@ -195,6 +225,7 @@ std::string FormatPomdpx(const planner::Problem& problem, const PomdpOptions& op
   text += "  <Func><Var>reward</Var><Parent>action robot_0 target_0</Parent><Parameter type=\"TBL\">\n";
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     for (std::size_t r = 0; r < cells; ++r) {
+      RequireSize(problem, text);
       ForEachDistinct(
           hypotheses, [&](std::size_t h) { return model.At(m, r, h).cost; },
           [&](const std::string& h, double cost) {

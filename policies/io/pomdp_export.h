@@ -15,8 +15,11 @@ namespace feeler::policies {
 /// contact flag is not written because it is known: contact is true exactly when fewer cells were travelled than asked
 /// for, and the cells before and after are both observed.
 struct PomdpOptions {
-  double discount = 1.0;  ///< in (0, 1]; below 1 the optimum is another one
+  /// In (0, 1]. 1 is the problem itself. Below 1 a cost c of a policy of at most n moves becomes at least
+  /// discount^(n-1) c: too small by at most the share 1 - discount^(n-1), and the optimum may be another policy.
+  double discount = 1.0;
   /// A proven upper bound of the optimal expected cost, such as the cost of a complete policy; makes the penalty small.
+  /// Refused where it is below the proven lower bound of a solver (20,000 expansions).
   /// Infinity: a bound is worked out from the problem.
   double upper_bound = std::numeric_limits<double>::infinity();
 };
@@ -26,8 +29,8 @@ struct PomdpOptions {
 /// optimal policy that never does. Throws NegativeResult if a pair of hypotheses cannot be told apart.
 double DeclarePenalty(const planner::Problem& problem, const PomdpOptions& options = {});
 
-/// Cassandra's `.pomdp` format, `values: cost`, one flat state space. Throws InputError if options are out of range or
-/// the file would exceed about 400 MB, NegativeResult as above.
+/// Cassandra's `.pomdp` format, `values: reward` (negated costs: solvers that ignore the line maximise), one flat state
+/// space. Throws InputError if options are out of range or the file would exceed 400 MB, NegativeResult as above.
 std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& options = {});
 
 /// POMDPX 1.0 with mixed observability: the robot cell a fully observed variable, the hypothesis a hidden one; rewards

@@ -27,7 +27,7 @@ planner::ProblemFamily ReadProblemFamily(const std::string& path, const Task& ta
     try {
       families.push_back(planner::ParseProblemFamily(spec, task));
     } catch (const InputError& error) {
-      item.Fail(error.what());
+      item.Fail(error.what(), "correct it");
     }
   }
   return planner::UnionOf(families, path);

@@ -177,7 +177,7 @@ Database Database::OpenOrCreate(const std::string& path, const DatabaseIdentity&
 Database Database::Create(const std::string& path, const DatabaseIdentity& identity) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0) {
-    throw InputError(path, "exists already", "give another name, or delete it");
+    throw InputError(path, "exists already", "give another name");
   }
   return OpenOrCreate(path, identity);
 }

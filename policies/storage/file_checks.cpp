@@ -13,7 +13,7 @@
 namespace feeler::policies {
 namespace {
 
-constexpr const char* kRestore = "restore it from a copy, or delete it and run feeler preprocess again";
+constexpr const char* kRestore = "restore it from a copy, or move it away and run feeler preprocess again";
 
 std::uint32_t BigEndian(const std::array<unsigned char, SqliteConnection::kHeaderSize>& header, std::size_t at, int n) {
   std::uint32_t value = 0;

@@ -82,7 +82,8 @@ StoredProblem FromRow(const ProblemRow& row, const std::string& where) {
   problem.policy = DecodePolicyBlob(row.blob, where);
   if (!SameBits(problem.policy->expected_cost, problem.expected_cost) ||
       !SameBits(problem.policy->lower_bound, problem.lower_bound)) {
-    throw InputError(where, "the row's numbers are not those of its policy", "delete the file and make it again");
+    throw InputError(where, "the row's numbers are not those of its policy",
+                     "restore the file from a copy, or move it away and run feeler preprocess again");
   }
   return problem;
 }

@@ -34,7 +34,7 @@ std::vector<std::string> WordsOf(const std::string& text, const std::string& key
 TEST(Export, PomdpDeclaresWhatItUses) {
   const CommandResult result = RunFeeler({"export", "--problem", kProblem, "--format", "pomdp"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(WordsOf(result.out, "values"), std::vector<std::string>{"cost"});
+  EXPECT_EQ(WordsOf(result.out, "values"), std::vector<std::string>{"reward"});
   const auto states = WordsOf(result.out, "states");
   const auto actions = WordsOf(result.out, "actions");
   const auto observations = WordsOf(result.out, "observations");

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -29,10 +30,12 @@ void WriteFile(const std::string& path, const std::string& content) {
 
 namespace {
 
-pid_t Start(const std::vector<std::string>& arguments, const std::string& out, const std::string& err) {
+pid_t Start(const std::vector<std::string>& arguments, const std::string& out, const std::string& err,
+            const std::function<void()>& in_child = {}) {
   const pid_t child = fork();
   if (child != 0) return child;
   if (freopen(out.c_str(), "w", stdout) == nullptr || freopen(err.c_str(), "w", stderr) == nullptr) _exit(126);
+  if (in_child) in_child();
   std::vector<char*> argv = {const_cast<char*>(FEELER_BINARY)};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
@@ -51,10 +54,9 @@ bool KillFeelerAfter(const std::vector<std::string>& arguments, double seconds) 
   return WIFSIGNALED(status);
 }
 
-CommandResult RunFeeler(const std::vector<std::string>& arguments) {
-  static int calls = 0;
-  const std::string folder = ScratchFolder("call" + std::to_string(calls++));
-  const pid_t child = Start(arguments, folder + "/out", folder + "/err");
+namespace {
+
+CommandResult Finish(pid_t child, const std::string& folder) {
   int status = 0;
   waitpid(child, &status, 0);
   CommandResult result;
@@ -63,6 +65,36 @@ CommandResult RunFeeler(const std::vector<std::string>& arguments) {
   result.err = ReadFile(folder + "/err");
   std::filesystem::remove_all(folder);
   return result;
+}
+
+std::string CallFolder() {
+  static int calls = 0;
+  return ScratchFolder("call" + std::to_string(calls++));
+}
+
+}  // namespace
+
+CommandResult RunFeeler(const std::vector<std::string>& arguments) { return RunFeeler(arguments, {}); }
+
+CommandResult RunFeeler(const std::vector<std::string>& arguments, const std::function<void()>& in_child) {
+  const std::string folder = CallFolder();
+  return Finish(Start(arguments, folder + "/out", folder + "/err", in_child), folder);
+}
+
+SignalledResult SignalFeeler(const std::vector<std::string>& arguments, double after_s, const std::vector<int>& signals,
+                             const std::function<void()>& in_child) {
+  const std::string folder = CallFolder();
+  const pid_t child = Start(arguments, folder + "/out", folder + "/err", in_child);
+  usleep(static_cast<useconds_t>(after_s * 1e6));
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    if (i > 0) usleep(100'000);
+    kill(child, signals[i]);
+  }
+  SignalledResult signalled;
+  signalled.result = Finish(child, folder);
+  signalled.ended_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return signalled;
 }
 
 }  // namespace feeler::cli

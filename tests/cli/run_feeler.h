@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,16 @@ struct CommandResult {
 
 /// Runs the feeler binary with these arguments, in a scratch folder of its own, with its cache under the test's folder.
 CommandResult RunFeeler(const std::vector<std::string>& arguments);
+/// The same after `in_child` has changed the process that becomes it: its descriptors, limits, signals.
+CommandResult RunFeeler(const std::vector<std::string>& arguments, const std::function<void()>& in_child);
+
+/// Starts the feeler binary, sends the signals `after_s` seconds later, a tenth of a second apart, and waits.
+struct SignalledResult {
+  CommandResult result;
+  double ended_s = 0.0;  ///< after the first signal
+};
+SignalledResult SignalFeeler(const std::vector<std::string>& arguments, double after_s, const std::vector<int>& signals,
+                             const std::function<void()>& in_child = {});
 
 /// Starts the feeler binary and ends it without warning (SIGKILL) after a while, or lets it end by itself before.
 /// Returns true if it was killed.

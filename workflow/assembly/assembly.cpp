@@ -132,7 +132,8 @@ class Loader {
   void RequireTask(const Node& node, const std::string& task) {
     if (assembly_.tasks.contains(task)) return;
     const std::vector<std::string> known = env::ListTasks();
-    if (std::find(known.begin(), known.end(), task) == known.end() && !fs::exists(task)) {
+    std::error_code error;
+    if (std::find(known.begin(), known.end(), task) == known.end() && !fs::exists(task, error)) {
       node.Fail(fmt::format("no task is named '{}'", task), fmt::format("one of {}", fmt::join(known, ", ")));
     }
     assembly_.tasks.emplace(task, std::make_shared<const env::TaskModel>(env::LoadTask(task)));
@@ -142,7 +143,8 @@ class Loader {
     const std::string name = node.Text();
     const bool is_path = name.find('/') != std::string::npos || name.ends_with(".json");
     const fs::path file = is_path ? folder / name : env::ModelsFolder() / "parts" / (name + ".json");
-    if (!fs::is_regular_file(file)) node.Fail("there is no kit " + file.string(), "name one that exists");
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) node.Fail("there is no kit " + file.string(), "name one that exists");
     const json document = perception::ParseJson(perception::ReadFile(file.string()), file.string());
     const Node root{&document, file.string() + ": "};
     root.Object({"about", "assets", "parts"});
@@ -156,8 +158,10 @@ class Loader {
   }
 
   static fs::path ExistingFile(const Node& node, const fs::path& folder) {
-    fs::path file = fs::absolute(folder / node.Text()).lexically_normal();
-    if (!fs::is_regular_file(file)) node.Fail("there is no file " + file.string(), "name one that exists");
+    std::error_code error;
+    fs::path file = fs::absolute(folder / node.Text(), error).lexically_normal();
+    if (error || !fs::is_regular_file(file, error))
+      node.Fail("there is no file " + file.string(), "name one that exists");
     return file;
   }
 
@@ -302,7 +306,8 @@ std::string Assembly::Describe(std::size_t insertion) const {
 Assembly LoadAssembly(const std::string& name) {
   const bool is_path = name.find('/') != std::string::npos || name.ends_with(".json");
   const fs::path file = is_path ? fs::path(name) : env::ModelsFolder() / "assemblies" / (name + ".json");
-  if (!fs::is_regular_file(file)) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) {
     throw InputError("--assembly", fmt::format("no assembly is named '{}' and no file is", name),
                      fmt::format("one of {}, or a path", fmt::join(ListAssemblies(), ", ")));
   }

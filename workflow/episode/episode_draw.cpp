@@ -16,7 +16,9 @@ void MoveOutside(const Task& task, const planner::Extents& cuboid, const Episode
   for (const UncertainAxis& axis : task.axes) {
     if (!axis.angular()) axes.push_back(&axis);
   }
-  if (axes.empty()) throw InputError("noise outside", "the task has no uncertain position");
+  if (axes.empty())
+    throw InputError("noise outside", "the task has no uncertain position",
+                     "leave out the fault or choose a task with uncertain axes x, y or z");
   const UncertainAxis& axis = *axes[random.Index(axes.size())];
   const int i = static_cast<int>(axis.kind);
   const double side = random.Index(2) == 0 ? -1.0 : 1.0;

@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/core/random.h"
 #include "feeler/core/worker_pool.h"
 #include "feeler/env/model/fingerprint.h"
@@ -60,6 +62,7 @@ std::vector<std::optional<CalibrationSample>> ReadPartial(const std::string& pat
   if (!in || !std::getline(in, line) || line != settings) return samples;
   while (std::getline(in, line)) {
     try {
+      if (IsNestedDeeper(line)) continue;
       const auto json = nlohmann::json::parse(line);
       CalibrationSample sample;
       sample.index = json.at("index").get<std::int64_t>();
@@ -165,13 +168,13 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   std::ofstream partial;
   if (!options.partial.empty()) {
     samples = ReadPartial(options.partial, settings, options);
-    partial.open(options.partial, std::ios::trunc);
-    if (!partial) throw InputError(options.partial, "cannot be written", "choose another folder");
-    partial << settings << "\n";
+    std::string kept = settings + "\n";
     for (const auto& sample : samples) {
-      if (sample) partial << ToJson(*sample).dump() << "\n";
+      if (sample) kept += ToJson(*sample).dump() + "\n";
     }
-    partial.flush();
+    WriteFileAtomically(options.partial, kept);  // killed here, the samples of the run before stand
+    partial.open(options.partial, std::ios::app);
+    if (!partial) throw InputError(options.partial, "cannot be written", "choose another folder");
   }
 
   std::vector<std::size_t> missing;
@@ -193,7 +196,9 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   };
   const auto keep = [&](std::size_t i, const CalibrationSample& sample) {
     samples[missing[i]] = sample;
-    if (partial.is_open()) partial << ToJson(sample).dump() << "\n" << std::flush;
+    if (partial.is_open() && !(partial << ToJson(sample).dump() << "\n" << std::flush)) {
+      throw InputError(options.partial, "cannot be written", "free some space");
+    }
     const auto done = had + static_cast<std::int64_t>(i) + 1;
     if (options.progress) options.progress(done, static_cast<std::int64_t>(samples.size()));
   };

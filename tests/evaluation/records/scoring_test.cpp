@@ -104,7 +104,8 @@ TEST(Adversaries, PoliciesFailWithTheirReason) {
          return GuardedMove{Direction::kPlusX, 1};
        },
        "policy threw: no idea"},
-      {"throws bad input", [](int) -> policies::Decision { throw InputError("me", "no idea"); }, "policy threw: me"},
+      {"throws bad input", [](int) -> policies::Decision { throw InputError("me", "no idea", "ask somebody"); },
+       "policy threw: me"},
       {"gives up", [](int) { return policies::GiveUp{"tired"}; }, "policy gave up: tired"},
   };
   for (const Case& c : cases) {

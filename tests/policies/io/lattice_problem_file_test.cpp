@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 #include "feeler/policies/io/json_input.h"
 #include "tests/policies/random_policy.h"
 
@@ -208,8 +209,8 @@ TEST(LatticeProblemFile, ReportsUnreadableFiles) {
   EXPECT_THROW(ReadLatticeProblem("/nonexistent/file.json"), InputError);
   EXPECT_THROW(ReadLatticeProblem("/tmp"), InputError);
   EXPECT_THROW(ReadTextFile("/dev/zero", 1 << 20), InputError);
-  EXPECT_THROW(WriteTextFile("/nonexistent/file.json", "text"), InputError);
-  EXPECT_THROW(WriteTextFile("/tmp", "text"), InputError);
+  EXPECT_THROW(WriteFileAtomically("/nonexistent/file.json", "text"), InputError);
+  EXPECT_THROW(WriteFileAtomically("/tmp", "text"), InputError);
 }
 
 TEST(LatticeProblemFile, SurvivesTwentyThousandMutations) {

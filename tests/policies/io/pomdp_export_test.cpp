@@ -1,7 +1,10 @@
 // Laws of the POMDP export, checked by parsers and a belief solver of the test's own:
 // - the value of the exported POMDP (least expected cost of reaching `done`) is the optimum of the problem, as brute
 //   force on the problem itself finds it: singleton and insertable goals, uniform and weighted priors, any cost;
-// - also with the smallest admissible penalty; with too small a penalty it is not (the test can tell);
+// - also with the smallest admissible penalty; with too small a penalty it is not (the test can tell), and an upper
+// bound
+//   below the optimum is refused;
+// - with a discount the value lies between discount^(n-1) times the optimum and the optimum, n the moves of a policy;
 // - the model is well-formed: one successor and one observation for each state and action, `done` absorbing and free;
 // - the .pomdpx, flattened, is the same model as the .pomdp;
 // - problems that cannot be localized are refused with the pair.
@@ -54,7 +57,7 @@ Model ParsePomdp(const std::string& text) {
     const std::vector<std::string> rest(w.begin() + 1, w.end());
     if (head == "discount:") model.discount = std::stod(rest.at(0));
     if (head == "values:") {
-      EXPECT_EQ(rest.at(0), "cost");
+      EXPECT_EQ(rest.at(0), "reward");
     }
     if (head == "states:") model.states = rest;
     if (head == "actions:") model.actions = rest;
@@ -72,8 +75,8 @@ Model ParsePomdp(const std::string& text) {
         EXPECT_TRUE(model.next.emplace(std::pair{rest[0], state}, rest[4]).second) << "two successors: " << line;
       }
     }
-    if (head == "R:") model.cost[{rest.at(0), rest.at(2)}] = std::stod(rest.at(7));  // action : state : * : * cost
-    if (head == "O:") {                                                              // * : state : observation 1.0
+    if (head == "R:") model.cost[{rest.at(0), rest.at(2)}] = -std::stod(rest.at(7));  // action : state : * : * reward
+    if (head == "O:") {                                                               // * : state : observation 1.0
       EXPECT_EQ(rest.at(0), "*");
       EXPECT_EQ(rest.at(5), "1.0");
       EXPECT_TRUE(model.observed.emplace(rest.at(2), rest.at(4)).second);
@@ -214,7 +217,9 @@ double Value(const Model& model) {
     for (std::size_t b = 0; b < beliefs.size(); ++b) {
       for (const Choice& choice : choices[b]) {
         double cost = choice.cost;
-        for (const Successor& s : choice.successors) cost += s.probability * value[s.belief];
+        for (const Successor& s : choice.successors) {
+          if (s.probability > 0.0) cost += model.discount * s.probability * value[s.belief];
+        }
         if (cost < value[b] - 1e-13) value[b] = cost, changed = true;
       }
     }
@@ -254,8 +259,38 @@ TEST(PomdpExport, HasTheValueOfTheProblem) {
     EXPECT_LE(DeclarePenalty(problem, tight), DeclarePenalty(problem));
     EXPECT_NEAR(Value(ParsePomdp(FormatPomdp(problem, tight))), optimum, 1e-9) << "problem " << i;
     PomdpOptions wrong;
-    wrong.upper_bound = 0.0;
-    EXPECT_LT(Value(ParsePomdp(FormatPomdp(problem, wrong))), optimum - 1e-3) << "problem " << i;
+    for (const double share : {0.0, 0.5, 0.999}) {
+      wrong.upper_bound = share * optimum;
+      EXPECT_THROW(FormatPomdp(problem, wrong), InputError) << "problem " << i << ", share " << share;
+    }
+    Model cheap = model;
+    for (auto& [pair, cost] : cheap.cost) cost = pair.first.starts_with("declare") ? 1e-3 : cost;
+    EXPECT_LT(Value(cheap), optimum - 1e-3) << "problem " << i;
+  }
+}
+
+TEST(PomdpExport, ADiscountMovesTheValueByNoMoreThanItsBound) {
+  for (planner::LatticeProblemData data : Problems()) {
+    data.cost.per_action = 0.5;  // without it a free loop for ever is the best of a discounted world
+    const planner::Problem problem = planner::MakeLatticeProblem(data);
+    const double optimum = BruteForce(problem).Value();
+    // An optimal policy has at most this many moves, each of which costs at least per_action, on average; and its
+    // worst history at most as much cost as the optimum over the smallest weight.
+    double smallest = 1.0;
+    double total = 0.0;
+    for (const planner::Hypothesis& h : problem.hypotheses) total += h.weight;
+    for (const planner::Hypothesis& h : problem.hypotheses) smallest = std::min(smallest, h.weight / total);
+    const double moves = optimum / smallest / data.cost.per_action;
+    for (const double discount : {0.999, 0.99}) {
+      ASSERT_GT(data.cost.per_action / (1.0 - discount), optimum) << "delaying for ever would pay";
+      PomdpOptions options;
+      options.discount = discount;
+      const Model model = ParsePomdp(FormatPomdp(problem, options));
+      EXPECT_EQ(model.discount, discount);
+      const double value = Value(model);
+      EXPECT_LT(value, optimum - 1e-6);
+      EXPECT_GE(value, std::pow(discount, moves) * optimum - 1e-9);
+    }
   }
 }
 

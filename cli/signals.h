@@ -1,0 +1,12 @@
+#pragma once
+
+#include "feeler/core/progress.h"
+
+namespace feeler::cli {
+
+/// From now on SIGINT, SIGTERM and SIGHUP cancel `cancellation`. Work that has not ended 1.5 s later is ended: outputs
+/// that are whole up to here take their places (OutputFile), the exit code is 1. A second signal ends at once. A SIGHUP
+/// that was ignored at the start stays ignored; SIGPIPE is ignored: writing fails instead. Call once.
+void CancelOnSignals(CancellationToken& cancellation);
+
+}  // namespace feeler::cli

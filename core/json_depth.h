@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string_view>
+
+namespace feeler {
+
+/// Levels that any JSON document of ours may have: those that are read only to be shown included.
+inline constexpr int kMostJsonLevels = 64;
+
+/// True if brackets are nested deeper than `levels` anywhere in a JSON text. To be asked before parsing: a parsed
+/// document of 100,000 levels overflows the stack where it is copied, written or destroyed.
+constexpr bool IsNestedDeeper(std::string_view text, int levels = kMostJsonLevels) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted) {
+      if (c == '\\') ++i;
+      if (c == '"') quoted = false;
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == '[' || c == '{') {
+      if (++depth > levels) return true;
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return false;
+}
+
+}  // namespace feeler

@@ -1,0 +1,73 @@
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "feeler/perception/depth_file.h"
+#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/solve.h"
+#include "feeler/policies/io/lattice_problem_file.h"
+#include "feeler/policies/io/policy_blob.h"
+#include "feeler/policies/io/policy_json.h"
+#include "tests/fuzz/readers.h"
+
+namespace feeler::fuzz {
+namespace {
+
+std::vector<std::string> ProblemFiles() {
+  std::vector<std::string> texts;
+  for (const auto& entry : std::filesystem::directory_iterator(FEELER_SOURCE_DIR "/tests/data")) {
+    if (entry.path().extension() != ".json" || entry.file_size() > 20'000) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    texts.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  }
+  return texts;
+}
+
+/// A policy as file or as blob.
+std::vector<std::string> Policies(bool blob) {
+  const planner::Problem problem =
+      planner::MakeLatticeProblem(policies::ReadLatticeProblem(FEELER_SOURCE_DIR "/tests/data/slot2d.json"));
+  const auto result = planner::Solve(problem, planner::FastSetting(planner::SolverKind::kCertified, 1.0));
+  if (blob) return {policies::EncodePolicyBlob(*result.policy)};
+  return {policies::FormatPolicyFile(policies::ToPolicyFile(problem, *result.policy, "slot"))};
+}
+
+std::vector<std::string> Clouds() {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string pcd =
+      "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\n"
+      "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\n";
+  const std::string points = "0.1 0.2 0.3\n0.4 0.5 0.6\n0.7 0.8 0.9\n";
+  std::string binary_ply = ply + "end_header\n" + std::string(36, '\x3e');
+  binary_ply.replace(binary_ply.find("ascii"), 5, "binary_little_endian");
+  return {ply + "end_header\n" + points, binary_ply,
+          ply + "element face 1\nproperty list uchar int vertex_indices\nend_header\n" + points + "3 0 1 2\n",
+          pcd + "DATA ascii\n" + points, pcd + "DATA binary\n" + std::string(36, '\x3e')};
+}
+
+std::vector<std::string> DepthImages() {
+  perception::DepthFrame frame{64, 48, std::vector<float>(std::size_t{64} * 48, 0.7F)};
+  for (std::size_t i = 0; i < frame.depth_m.size(); ++i) frame.depth_m[i] += 1e-4F * static_cast<float>(i % 97);
+  return {perception::EncodeDepthPng(frame, 1e-3)};
+}
+
+const std::string kTable =
+    R"({"kind":"feeler uncertainty table","version":1,"task":"plug","fingerprint":"0","axes":[{"axis":"x","resolution":0.002,)"
+    R"("min_cells":2,"max_cells":15}],"camera_m":[0.1,0.2,0.9],"averaged_frames":10,"rules":[],"plain_rules":[]})";
+
+}  // namespace
+
+std::vector<std::string> Seeds(const Reader& reader) {
+  const std::string_view name = reader.name;
+  if (name == "policy_file") return Policies(false);
+  if (name == "policy_blob") return Policies(true);
+  if (name == "family") return {"2..15x2..15x2..15", "3x4x5", "2..3x7x2..2"};
+  if (name == "cloud") return Clouds();
+  if (name == "depth") return DepthImages();
+  if (name == "intrinsics") return {perception::ToJson(perception::CameraIntrinsics{640, 480, 600, 600, 320, 240})};
+  if (name == "table") return {kTable};
+  return ProblemFiles();
+}
+
+}  // namespace feeler::fuzz
