@@ -9,7 +9,7 @@
 namespace feeler::planner {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// (O5) A certificate is shared out over the neighbours that are members.
 struct Charges {
@@ -192,13 +192,13 @@ CountedTwice FindCountedTwice(const OpenLayer& layer, const Charges& charges) {
   double most = 0.0;
   for (std::size_t k = 0; k < layer.members.size(); ++k) {
     const OpenLayer::Member& member = layer.members[k];
-    double least = kInfinity;
+    double least = kNever;
     for (std::size_t i = 0; i < 4; ++i) {
       if ((member.mask >> i & 1) == 0) continue;
       const auto other = static_cast<std::size_t>(member.neighbour[i]);
       least = std::min(least, charges.share[4 * k + i] + charges.share[4 * other + (i ^ 1)]);
     }
-    twice.least[k] = least == kInfinity ? 0.0 : least;
+    twice.least[k] = least == kNever ? 0.0 : least;
     most = std::max(most, twice.least[k]);
   }
   // Looking two steps later instead saves what is counted twice but delays all that follow.
@@ -279,7 +279,7 @@ std::array<Account, 3> AccountsOf(const OpenLayer& layer, const AtPlace& at) {
 double RoughBound(const OpenCertificates& certificates, const OpenLayer& layer, const OpenPlace& place) {
   const AtPlace& at = LookAt(certificates, layer, place);
   const std::size_t count = layer.members.size();
-  double bound = kInfinity;
+  double bound = kNever;
   for (auto m = static_cast<std::size_t>(at.charges.inside); m < count; ++m) {
     const Times times = TimesAfter(layer, at, m);
     const double early = layer.slots_before[m];
@@ -295,7 +295,7 @@ double RefinedBound(const OpenCertificates& certificates, const OpenLayer& layer
   const AtPlace& at = LookAt(certificates, layer, place);
   const std::array<Account, 3> accounts = AccountsOf(layer, at);
   const std::size_t count = layer.members.size();
-  double bound = kInfinity;
+  double bound = kNever;
   for (auto m = static_cast<std::size_t>(at.charges.inside); m < count; ++m) {
     const double early = layer.slots_before[m];
     const double early_step_by_step =
