@@ -71,7 +71,9 @@ perception::Registration Locate(const Flags& flags, const workflow::TargetFinder
     camera = perception::ParseIntrinsics(perception::ReadFile(flags.intrinsics), flags.intrinsics);
   }
   if (!flags.cloud.empty()) {
-    perception::Points points = perception::ReadCloud(flags.cloud);
+    std::vector<std::string> notes;
+    perception::Points points = perception::ReadCloud(flags.cloud, &notes);
+    for (const std::string& note : notes) fmt::print(stderr, "{}\n", note);
     if (!camera) return finder.InCloud(points, table.camera_m);
     for (Eigen::Vector3d& p : points) p = camera->world_T_camera * p;
     return finder.InCloud(points, camera->world_T_camera.translation());

@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/error.h"
@@ -37,35 +38,32 @@ class ByteCursor {
 
   std::size_t left() const { return bytes_.size() - at_; }
 
-  /// The next line without its end; at the end of the file an InputError.
+  /// The next line without its end (LF, CR LF or CR); at the end of the file an InputError.
   std::string_view Line() {
     if (left() == 0) Fail("is cut off");
-    const std::size_t end = bytes_.find('\n', at_);
-    std::string_view line = bytes_.substr(at_, end == std::string_view::npos ? end : end - at_);
+    const std::size_t end = bytes_.find_first_of("\r\n", at_);
+    const std::string_view line = bytes_.substr(at_, end == std::string_view::npos ? end : end - at_);
     at_ = end == std::string_view::npos ? bytes_.size() : end + 1;
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (end != std::string_view::npos && bytes_[end] == '\r' && left() > 0 && bytes_[at_] == '\n') ++at_;
+    ++lines_;
     return line;
   }
 
-  /// The next word between spaces and line ends.
-  std::string_view Word() {
-    const auto space = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
-    while (at_ < bytes_.size() && space(bytes_[at_])) ++at_;
-    const std::size_t start = at_;
-    while (at_ < bytes_.size() && !space(bytes_[at_])) ++at_;
-    if (start == at_) Fail("is cut off");
-    return bytes_.substr(start, at_ - start);
-  }
+  /// The number of the line that Line() returned last, from 1.
+  std::size_t line_number() const { return lines_; }
 
-  /// The next word as a number; "nan" and what overflows are no finite number.
-  double TextNumber() {
-    std::string_view word = Word();
+  /// The bytes that are left.
+  std::string_view Rest() const { return bytes_.substr(at_); }
+
+  /// A word as a number; "nan" and what overflows are no finite number. What is no number is an InputError.
+  double TextNumber(std::string_view word) const {
     if (word.size() > 1 && word.front() == '+') word.remove_prefix(1);
     double value = 0.0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error == std::errc::result_out_of_range) return std::numeric_limits<double>::infinity();
     if (error != std::errc() || end != word.data() + word.size()) {
-      Fail("holds '" + std::string(word.substr(0, 20)) + "' where a number should stand");
+      Fail("holds '" + std::string(word.substr(0, 20)) + "' where a number should stand, in line " +
+           std::to_string(lines_));
     }
     return value;
   }
@@ -116,6 +114,35 @@ class ByteCursor {
   std::string_view bytes_;
   const std::string& where_;
   std::size_t at_ = 0;
+  std::size_t lines_ = 0;
+};
+
+/// The words of one line of numbers, taken one by one; a line with fewer or more of them than are taken is an
+/// InputError that names the line.
+class LineNumbers {
+ public:
+  LineNumbers(const ByteCursor& cursor, std::vector<std::string_view> words)
+      : cursor_(cursor), words_(std::move(words)) {}
+
+  double Next() {
+    if (next_ == words_.size()) Refuse("too few");
+    return cursor_.TextNumber(words_[next_++]);
+  }
+
+  void End() const {
+    if (next_ != words_.size()) Refuse("too many");
+  }
+
+ private:
+  [[noreturn]] void Refuse(const char* what) const {
+    const bool last = cursor_.left() == 0 && next_ == words_.size();
+    cursor_.Fail((last ? "is cut off: it has " : "has ") + std::string(what) + " numbers (" +
+                 std::to_string(words_.size()) + ") in line " + std::to_string(cursor_.line_number()));
+  }
+
+  const ByteCursor& cursor_;
+  std::vector<std::string_view> words_;
+  std::size_t next_ = 0;
 };
 
 /// The words of a line.
@@ -132,6 +159,15 @@ inline std::vector<std::string_view> Words(std::string_view line) {
     at = end;
   }
   return words;
+}
+
+/// A word with its letters a to z as capitals.
+inline std::string Upper(std::string_view word) {
+  std::string upper(word);
+  for (char& c : upper) {
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  }
+  return upper;
 }
 
 }  // namespace feeler::perception

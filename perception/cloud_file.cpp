@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "feeler/perception/byte_cursor.h"
+#include "feeler/perception/cloud_kind.h"
 #include "feeler/perception/input_file.h"
+#include "feeler/perception/lzf.h"
 
 namespace feeler::perception {
 namespace {
@@ -26,6 +28,14 @@ std::size_t Count(std::string_view word, const ByteCursor& cursor) {
     cursor.Fail(fmt::format("has '{}' where a count of at most {} should stand", word.substr(0, 20), kMostPoints));
   }
   return count;
+}
+
+/// The words of the next line that is not blank.
+std::vector<std::string_view> NextWords(ByteCursor& cursor) {
+  for (;;) {
+    std::vector<std::string_view> words = Words(cursor.Line());
+    if (!words.empty()) return words;
+  }
 }
 
 /// Puts x, y and z together and keeps what is finite.
@@ -81,7 +91,11 @@ std::optional<NumberType> PlyType(std::string_view name) {
   return std::nullopt;
 }
 
-int AxisOfName(std::string_view name) { return name == "x" ? 0 : name == "y" ? 1 : name == "z" ? 2 : -1; }
+int AxisOfName(std::string_view name) {
+  if (name == "x" || name == "X") return 0;
+  if (name == "y" || name == "Y") return 1;
+  return name == "z" || name == "Z" ? 2 : -1;
+}
 
 PlyProperty ParseProperty(const std::vector<std::string_view>& words, const ByteCursor& cursor) {
   const bool list = words.size() > 1 && words[1] == "list";
@@ -137,9 +151,9 @@ std::vector<PlyElement> ParsePlyHeader(ByteCursor& cursor, Encoding& encoding) {
 Points ParsePly(ByteCursor& cursor) {
   Encoding encoding = Encoding::kText;
   const std::vector<PlyElement> elements = ParsePlyHeader(cursor, encoding);
+  std::optional<LineNumbers> line;  // of a text
   const auto number = [&](NumberType type) {
-    return encoding == Encoding::kText ? cursor.TextNumber()
-                                       : cursor.BinaryNumber(type, encoding == Encoding::kBigEndian);
+    return line ? line->Next() : cursor.BinaryNumber(type, encoding == Encoding::kBigEndian);
   };
   const auto skip_list = [&](const PlyProperty& property) {
     const double count = number(*property.count_type);
@@ -155,6 +169,7 @@ Points ParsePly(ByteCursor& cursor) {
     if (element.vertex && !(given[0] && given[1] && given[2])) cursor.Fail("has vertices without x, y and z");
     Collector collector;
     for (std::size_t i = 0; i < element.count; ++i) {
+      if (encoding == Encoding::kText) line.emplace(cursor, NextWords(cursor));
       for (const PlyProperty& property : element.properties) {
         if (property.count_type) {
           skip_list(property);
@@ -163,6 +178,7 @@ Points ParsePly(ByteCursor& cursor) {
           if (property.axis >= 0) collector.Set(property.axis, value);
         }
       }
+      if (line) line->End();
       if (element.vertex) collector.Finish();
     }
     if (element.vertex) return collector.Take();
@@ -184,7 +200,19 @@ struct PcdHeader {
   std::size_t points = 0;
   std::optional<std::size_t> width, height;
   std::string data;
+  bool moved_viewpoint = false;
 };
+
+/// Whether a VIEWPOINT line (translation, quaternion w x y z) says other than the identity.
+bool IsMoved(const std::vector<std::string_view>& words, const ByteCursor& cursor) {
+  constexpr std::array<double, 7> kIdentity = {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0};
+  if (words.size() != kIdentity.size() + 1) cursor.Fail("has a VIEWPOINT of other than 7 numbers");
+  bool moved = false;
+  for (std::size_t i = 0; i < kIdentity.size(); ++i) {
+    if (cursor.TextNumber(words[i + 1]) != kIdentity[i]) moved = true;
+  }
+  return moved;
+}
 
 NumberType PcdType(std::string_view type, std::string_view size, const ByteCursor& cursor) {
   constexpr std::array<std::pair<std::string_view, NumberType>, 10> kTypes = {{
@@ -218,26 +246,29 @@ PcdHeader ParsePcdHeader(ByteCursor& cursor) {
     if (words.empty() || words[0].front() == '#') continue;
     if (words.size() < 2) cursor.Fail(fmt::format("has an empty '{}' line", words[0].substr(0, 20)));
     if (words.size() > kMostFields) cursor.Fail("has too many fields");
-    if (words[0] == "FIELDS" || words[0] == "COLUMNS") {
+    const std::string key = Upper(words[0]);
+    if (key == "FIELDS" || key == "COLUMNS") {
       header.fields.clear();
       for (std::size_t i = 1; i < words.size(); ++i)
         header.fields.push_back({NumberType::kFloat, 1, AxisOfName(words[i])});
-    } else if (words[0] == "SIZE") {
+    } else if (key == "SIZE") {
       header.sizes = texts(words);
-    } else if (words[0] == "TYPE") {
+    } else if (key == "TYPE") {
       header.types = texts(words);
-    } else if (words[0] == "COUNT") {
+    } else if (key == "COUNT") {
       header.counts = texts(words);
-    } else if (words[0] == "WIDTH") {
+    } else if (key == "WIDTH") {
       header.width = Count(words[1], cursor);
-    } else if (words[0] == "HEIGHT") {
+    } else if (key == "HEIGHT") {
       header.height = Count(words[1], cursor);
-    } else if (words[0] == "POINTS") {
+    } else if (key == "POINTS") {
       header.points = Count(words[1], cursor);
       points = true;
-    } else if (words[0] == "DATA") {
+    } else if (key == "DATA") {
       header.data = words[1];
-    } else if (words[0] != "VERSION" && words[0] != "VIEWPOINT") {
+    } else if (key == "VIEWPOINT") {
+      header.moved_viewpoint = IsMoved(words, cursor);
+    } else if (key != "VERSION") {
       cursor.Fail(fmt::format("has the unknown header line '{}'", words[0].substr(0, 20)));
     }
   }
@@ -263,35 +294,77 @@ PcdHeader ParsePcdHeader(ByteCursor& cursor) {
   return header;
 }
 
-Points ParsePcd(ByteCursor& cursor) {
-  const PcdHeader header = ParsePcdHeader(cursor);
-  if (header.data == "binary_compressed") {
-    cursor.Fail("is compressed (DATA binary_compressed), which is not read: convert it to DATA binary");
+std::size_t Stride(const PcdHeader& header, const ByteCursor& cursor) {
+  std::size_t stride = 0;
+  for (const PcdField& field : header.fields) stride += field.count * SizeOf(field.type);
+  if (stride > kLargestFile || header.points * stride > kLargestFile) cursor.Fail("is too large");
+  return stride;
+}
+
+Points PcdText(const PcdHeader& header, ByteCursor& cursor) {
+  Collector collector;
+  for (std::size_t i = 0; i < header.points; ++i) {
+    LineNumbers line(cursor, NextWords(cursor));
+    for (const PcdField& field : header.fields) {
+      for (std::size_t k = 0; k < field.count; ++k) {
+        const double value = line.Next();
+        if (field.axis >= 0) collector.Set(field.axis, value);
+      }
+    }
+    line.End();
+    collector.Finish();
   }
-  const bool text = header.data == "ascii";
-  if (!text && header.data != "binary") {
-    cursor.Fail(fmt::format("has DATA of the unknown kind '{}'", header.data.substr(0, 30)));
-  }
-  if (!text) {
-    std::size_t stride = 0;
-    for (const PcdField& field : header.fields) stride += field.count * SizeOf(field.type);
-    if (stride > kLargestFile || header.points * stride > cursor.left()) cursor.Fail("is cut off");
-  }
+  return collector.Take();
+}
+
+Points PcdBinary(const PcdHeader& header, ByteCursor& cursor) {
+  if (header.points * Stride(header, cursor) > cursor.left()) cursor.Fail("is cut off");
   Collector collector;
   for (std::size_t i = 0; i < header.points; ++i) {
     for (const PcdField& field : header.fields) {
-      if (!text && field.axis < 0) {
+      if (field.axis < 0) {
         cursor.Skip(field.count * SizeOf(field.type));
-        continue;
-      }
-      for (std::size_t k = 0; k < field.count; ++k) {
-        const double value = text ? cursor.TextNumber() : cursor.BinaryNumber(field.type, false);
-        if (field.axis >= 0) collector.Set(field.axis, value);
+      } else {
+        collector.Set(field.axis, cursor.BinaryNumber(field.type, false));
       }
     }
     collector.Finish();
   }
   return collector.Take();
+}
+
+/// Two sizes, then the points by LZF, field after field instead of point after point.
+Points PcdCompressed(const PcdHeader& header, ByteCursor& cursor, const std::string& where) {
+  const std::size_t size = header.points * Stride(header, cursor);
+  const auto compressed = static_cast<std::size_t>(cursor.BinaryNumber(NumberType::kUint32, false));
+  const auto plain = static_cast<std::size_t>(cursor.BinaryNumber(NumberType::kUint32, false));
+  if (compressed > cursor.left()) cursor.Fail("is cut off");
+  if (plain != size) cursor.Fail(fmt::format("has {} bytes of points where {} should be", plain, size));
+  const std::optional<std::string> bytes = LzfDecompress(cursor.Rest().substr(0, compressed), plain);
+  if (!bytes) cursor.Fail("has compressed points that are damaged");
+  Points points(header.points, Eigen::Vector3d::Zero());
+  ByteCursor fields(*bytes, where);
+  for (const PcdField& field : header.fields) {
+    if (field.axis < 0) {
+      fields.Skip(header.points * field.count * SizeOf(field.type));
+      continue;
+    }
+    for (Eigen::Vector3d& point : points) point[field.axis] = fields.BinaryNumber(field.type, false);
+  }
+  std::erase_if(points, [](const Eigen::Vector3d& point) { return !point.allFinite(); });
+  return points;
+}
+
+Points ParsePcd(ByteCursor& cursor, const std::string& where, std::vector<std::string>* notes) {
+  const PcdHeader header = ParsePcdHeader(cursor);
+  if (header.moved_viewpoint && notes != nullptr) {
+    notes->push_back(where + ": its VIEWPOINT is ignored: coordinates are taken as those of the world");
+  }
+  const std::string kind = Upper(header.data);
+  if (kind == "ASCII") return PcdText(header, cursor);
+  if (kind == "BINARY") return PcdBinary(header, cursor);
+  if (kind == "BINARY_COMPRESSED") return PcdCompressed(header, cursor, where);
+  cursor.Fail(fmt::format("has DATA of the unknown kind '{}'", header.data.substr(0, 30)));
 }
 
 /// Coordinates of a depth camera's scene in metres are small.
@@ -309,18 +382,19 @@ void RequireMetres(const Points& points, const ByteCursor& cursor) {
 
 }  // namespace
 
-Points ParseCloud(std::string_view bytes, const std::string& where) {
+Points ParseCloud(std::string_view bytes, const std::string& where, std::vector<std::string>* notes) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (bytes.substr(0, kByteOrderMark.size()) == kByteOrderMark) bytes.remove_prefix(kByteOrderMark.size());
   ByteCursor cursor(bytes, where);
   if (bytes.empty()) cursor.Fail("is empty");
-  const bool ply = bytes.substr(0, 4) == "ply\n" || bytes.substr(0, 4) == "ply\r";
-  const bool pcd = bytes.substr(0, 1) == "#" || bytes.substr(0, 7) == "VERSION" || bytes.substr(0, 6) == "FIELDS";
-  if (!ply && !pcd) cursor.Fail("is neither a PLY nor a PCD file");
-  Points points = ply ? ParsePly(cursor) : ParsePcd(cursor);
+  Points points = KindOf(bytes, where) == CloudKind::kPly ? ParsePly(cursor) : ParsePcd(cursor, where, notes);
   if (points.empty()) cursor.Fail("holds no point with finite coordinates");
   RequireMetres(points, cursor);
   return points;
 }
 
-Points ReadCloud(const std::string& path) { return ParseCloud(ReadFile(path), path); }
+Points ReadCloud(const std::string& path, std::vector<std::string>* notes) {
+  return ParseCloud(ReadFile(path), path, notes);
+}
 
 }  // namespace feeler::perception

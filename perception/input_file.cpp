@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "feeler/core/error.h"
 
@@ -51,9 +51,15 @@ std::string ReadFile(const std::string& path) {
   if (!error && size > kLargestFile) {
     throw InputError(path, fmt::format("has {} bytes", size), fmt::format("give at most {}", kLargestFile));
   }
-  std::ostringstream bytes;
-  bytes << in.rdbuf();
-  return std::move(bytes).str();
+  std::string bytes;  // read to the end, at most to the limit: a device or pipe has no size of its own
+  std::array<char, 65536> chunk{};
+  while (in.read(chunk.data(), chunk.size()) || in.gcount() > 0) {
+    bytes.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
+    if (bytes.size() > kLargestFile) {
+      throw InputError(path, "does not end", fmt::format("give at most {} bytes", kLargestFile));
+    }
+  }
+  return bytes;
 }
 
 nlohmann::json ParseJson(std::string_view text, const std::string& where) {

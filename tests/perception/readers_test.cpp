@@ -1,5 +1,5 @@
 // Laws: every encoding of the same points reads as the same points (oracle: the points that were written), those that
-// are not finite left out; a depth image read back gives the depths to half a unit; what is cut off, compressed, of
+// are not finite left out; a depth image read back gives the depths to half a unit; what is cut off, damaged, of
 // wrong units or of another size than its camera is refused with words that say so.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -52,16 +52,69 @@ TEST(CloudFile, WhatIsCutOffIsRefused) {
   EXPECT_THAT(Complaint([&] { ParseCloud(text.substr(0, text.size() - 20), "cut.pcd"); }), HasSubstr("cut off"));
 }
 
-TEST(CloudFile, CompressedAndMillimetresAndEmptyAreSaid) {
-  std::string compressed = BinaryPcd(SamplePoints());
-  compressed.replace(compressed.find("DATA binary"), 11, "DATA binary_compressed");
-  EXPECT_THAT(Complaint([&] { ParseCloud(compressed, "c.pcd"); }), HasSubstr("binary_compressed"));
+// A text is read line by line: a number too few or too many in one line does not shift what follows.
+TEST(CloudFile, ALineOfAnotherLengthIsNamed) {
+  const std::string head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nDATA ascii\n";
+  const auto complaint = [&](const std::string& body) { return Complaint([&] { ParseCloud(head + body, "t.pcd"); }); };
+  EXPECT_EQ(complaint("1 2 3\n4 5 6\n7 8 9\n"), "");
+  EXPECT_THAT(complaint("1 2 3\n4 5\n6 7 8\n9 9 9\n"), HasSubstr("line 8"));
+  EXPECT_THAT(complaint("1 2 3 1\n4 5 6 1\n7 8 9 1\n"), HasSubstr("line 7"));
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n1 2\n3 4 5 6\n";
+  EXPECT_THAT(Complaint([&] { ParseCloud(ply, "t.ply"); }), HasSubstr("line 8"));
+}
+
+TEST(CloudFile, OddHeadersAreRead) {
+  const Points points = SamplePoints();
+  const std::string text = AsciiPcd(points);
+  ExpectSame(ParseCloud("\xEF\xBB\xBF" + text, "bom.pcd"), points);
+  ExpectSame(ParseCloud("\n  \n# note\n" + text, "blank.pcd"), points);
+  std::string carriage = text;
+  for (char& c : carriage) c = c == '\n' ? '\r' : c;
+  ExpectSame(ParseCloud(carriage, "cr.pcd"), points);
+  const std::string odd =
+      "points 1\nheight 1\nwidth 1 \ncount 1 1 1\ntype F F F\nsize 4 4 4\nfields x y z\ndata ascii \n";
+  ExpectSame(ParseCloud(odd + "1 2 3 \n", "odd.pcd"), {Eigen::Vector3d(1.0, 2.0, 3.0)});
+}
+
+TEST(CloudFile, AViewpointIsSaidToBeIgnored) {
+  const std::string head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\n";
+  std::vector<std::string> notes;
+  ParseCloud(head + "VIEWPOINT 0 0 0 1 0 0 0\nDATA ascii\n1 2 3\n", "v.pcd", &notes);
+  EXPECT_THAT(notes, testing::IsEmpty());
+  ParseCloud(head + "VIEWPOINT 0 0 1.5 1 0 0 0\nDATA ascii\n1 2 3\n", "v.pcd", &notes);
+  EXPECT_THAT(notes, testing::ElementsAre(HasSubstr("VIEWPOINT")));
+}
+
+// 24 bytes, field after field: x = (1, 1), y = (1, 1), z = (1, 2). After the literal 1.0F, a copy of 16 bytes from 4
+// back, which overlaps with itself, then literals.
+TEST(CloudFile, CompressedPointsAreRead) {
+  const std::string head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nDATA binary_compressed\n";
+  const std::string block("\x03\x00\x00\x80\x3f\xe0\x07\x03\x03\x00\x00\x00\x40", 13);
+  const std::string sizes("\x0d\x00\x00\x00\x18\x00\x00\x00", 8);
+  ExpectSame(ParseCloud(head + sizes + block, "c.pcd"), {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, 1, 2)});
+  for (std::size_t cut = 1; cut <= block.size(); ++cut) {
+    EXPECT_NE(Complaint([&] { ParseCloud(head + sizes + block.substr(0, block.size() - cut), "c.pcd"); }), "") << cut;
+  }
+  std::string far = block;
+  far[7] = '\x7f';  // a copy from before the start
+  EXPECT_THAT(Complaint([&] { ParseCloud(head + sizes + far, "c.pcd"); }), HasSubstr("damaged"));
+}
+
+TEST(InputFile, ADeviceWithoutEndIsRefused) {
+  EXPECT_THAT(Complaint([] { ReadFile("/dev/zero"); }), HasSubstr("does not end"));
+}
+
+TEST(CloudFile, MeshesMillimetresAndEmptyAreSaid) {
   Points millimetres = SamplePoints();
   for (Eigen::Vector3d& p : millimetres) p *= 1000.0;
   EXPECT_THAT(Complaint([&] { ParseCloud(AsciiPly(millimetres), "mm.ply"); }), HasSubstr("millimetres"));
   EXPECT_THAT(Complaint([&] { ParseCloud(AsciiPcd({}), "none.pcd"); }), HasSubstr("no point"));
   EXPECT_THAT(Complaint([&] { ParseCloud("", "empty"); }), HasSubstr("empty"));
-  EXPECT_THAT(Complaint([&] { ParseCloud("solid stl", "x.stl"); }), HasSubstr("neither"));
+  EXPECT_THAT(Complaint([&] { ParseCloud("solid stl", "x.stl"); }), HasSubstr("STL"));
+  EXPECT_THAT(Complaint([&] { ParseCloud("# a\nv 1 2 3\n", "x.obj"); }), HasSubstr("OBJ"));
+  EXPECT_THAT(Complaint([&] { ParseCloud("\n{}", "x"); }), HasSubstr("neither"));
 }
 
 TEST(DepthFile, ReadsWhatWasWritten) {
