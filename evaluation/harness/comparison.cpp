@@ -47,15 +47,15 @@ nlohmann::json ToJson(const SolveRecord& record) {
           {"wall_s", record.wall_s}};
 }
 
-SolveRecord RecordFromJson(const nlohmann::json& json) {
+SolveRecord RecordFromJson(const nlohmann::json& document) {
   SolveRecord record;
-  record.status = json.at("status").get<std::string>();
-  record.complete = !json.at("expected_cost").is_null();
-  if (record.complete) record.expected_cost = json.at("expected_cost").get<double>();
-  record.lower_bound = json.at("lower_bound").get<double>();
-  record.expansions = json.at("expansions").get<std::int64_t>();
-  record.cpu_s = json.at("cpu_s").get<double>();
-  record.wall_s = json.at("wall_s").get<double>();
+  record.status = document.at("status").get<std::string>();
+  record.complete = !document.at("expected_cost").is_null();
+  if (record.complete) record.expected_cost = document.at("expected_cost").get<double>();
+  record.lower_bound = document.at("lower_bound").get<double>();
+  record.expansions = document.at("expansions").get<std::int64_t>();
+  record.cpu_s = document.at("cpu_s").get<double>();
+  record.wall_s = document.at("wall_s").get<double>();
   return record;
 }
 

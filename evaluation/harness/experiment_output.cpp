@@ -55,16 +55,16 @@ nlohmann::json ManifestJson(const Manifest& manifest) {
 }
 
 nlohmann::json ToJson(const Figure& figure) {
-  nlohmann::json json = {{"title", figure.title}, {"x_label", figure.x_label}, {"y_label", figure.y_label},
-                         {"x_log", figure.x_log}, {"y_log", figure.y_log},     {"series", nlohmann::json::array()}};
+  nlohmann::json document = {{"title", figure.title}, {"x_label", figure.x_label}, {"y_label", figure.y_label},
+                             {"x_log", figure.x_log}, {"y_log", figure.y_log},     {"series", nlohmann::json::array()}};
   for (const FigureSeries& series : figure.series) {
     nlohmann::json points = nlohmann::json::array();
     for (const FigurePoint& p : series.points) {
       points.push_back({{"x", p.x}, {"y", p.y}, {"low", p.low}, {"high", p.high}});
     }
-    json["series"].push_back({{"name", series.name}, {"points", std::move(points)}});
+    document["series"].push_back({{"name", series.name}, {"points", std::move(points)}});
   }
-  return json;
+  return document;
 }
 
 std::string ToCsv(const ResultTable& table) {

@@ -20,11 +20,11 @@ const nlohmann::json& PaperResults() {
   static const nlohmann::json kResults = [] {
     const std::string file = FindData("evaluation/paper_results.json").string();
     std::ifstream in(file);
-    nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
-    if (!json.is_object()) {
+    nlohmann::json document = nlohmann::json::parse(in, nullptr, false);
+    if (!document.is_object()) {
       throw InputError(file, "damaged", "restore it from the source of feeler");
     }
-    return json;
+    return document;
   }();
   return kResults;
 }

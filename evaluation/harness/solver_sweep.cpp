@@ -73,7 +73,7 @@ planner::ProblemFamily DrawSample(const planner::ProblemFamily& family, int stra
 
 nlohmann::json ToJson(const SolverRow& row) {
   const planner::SolverOptions options = planner::WithFamilyBudget(row.options);  // what is used
-  nlohmann::json json = {
+  nlohmann::json document = {
       {"label", row.label},
       {"setting", row.setting},
       {"solver", planner::ToString(options.solver)},
@@ -84,19 +84,19 @@ nlohmann::json ToJson(const SolverRow& row) {
       {"memory_limit_bytes", options.memory_limit_bytes},
   };
   if (options.expansion_limit != std::numeric_limits<std::int64_t>::max()) {
-    json["expansion_limit"] = options.expansion_limit;
+    document["expansion_limit"] = options.expansion_limit;
   }
   if (options.solver == planner::SolverKind::kCertified) {
-    json["gap"] = options.gap;
+    document["gap"] = options.gap;
   } else {
-    json["epsilon"] = options.epsilon;
+    document["epsilon"] = options.epsilon;
   }
   if (options.solver == planner::SolverKind::kERtdpBel) {
-    json["experience"] = planner::ToString(row.experience);
-    json["jumps"] = planner::ToString(options.jumps);
-    json["order"] = row.order == planner::ProblemOrder::kUncertainty ? "uncertainty" : "random";
+    document["experience"] = planner::ToString(row.experience);
+    document["jumps"] = planner::ToString(options.jumps);
+    document["order"] = row.order == planner::ProblemOrder::kUncertainty ? "uncertainty" : "random";
   }
-  return json;
+  return document;
 }
 
 /// Keeps results as cells; policies only where they may serve as experience.

@@ -25,27 +25,27 @@ ordered_json LadderJson(const execution::ExecutionRecord& execution) {
 ordered_json AttemptJson(const InsertionAttempt& attempt) {
   const execution::ExecutionRecord& execution = attempt.execution;
   const planner::Extents& extents = attempt.extents;
-  ordered_json json;
-  json["extents"] = {extents.nx, extents.ny, extents.nz, extents.n_yaw, extents.n_pitch};
-  json["hypotheses"] = extents.Count();
-  json["policy"] = attempt.policy_source;
-  json["start_estimate"] = perception::PoseJson(attempt.world_T_estimate);
-  json["estimate"] =
+  ordered_json document;
+  document["extents"] = {extents.nx, extents.ny, extents.nz, extents.n_yaw, extents.n_pitch};
+  document["hypotheses"] = extents.Count();
+  document["policy"] = attempt.policy_source;
+  document["start_estimate"] = perception::PoseJson(attempt.world_T_estimate);
+  document["estimate"] =
       execution.world_T_estimate ? perception::PoseJson(*execution.world_T_estimate) : ordered_json(nullptr);
-  json["error"] = attempt.error ? ErrorJson(*attempt.error) : ordered_json(nullptr);
-  json["localized"] = attempt.localized;
-  json["reason"] = attempt.reason;
-  json["depth_m"] = attempt.depth_m;
-  json["lateral_m"] = attempt.lateral_m;
-  json["angle_rad"] = attempt.angle_rad;
-  json["contacts"] = execution.contacts;
-  json["policy_moves"] = execution.policy_moves;
-  json["motions"] = execution.moves.size();
-  json["path_length_m"] = execution.path_length_m;
-  json["sim_time_s"] = execution.sim_time_s;
-  json["localization_time_s"] = execution.localization_time_s;
-  json["ladder"] = LadderJson(execution);
-  return json;
+  document["error"] = attempt.error ? ErrorJson(*attempt.error) : ordered_json(nullptr);
+  document["localized"] = attempt.localized;
+  document["reason"] = attempt.reason;
+  document["depth_m"] = attempt.depth_m;
+  document["lateral_m"] = attempt.lateral_m;
+  document["angle_rad"] = attempt.angle_rad;
+  document["contacts"] = execution.contacts;
+  document["policy_moves"] = execution.policy_moves;
+  document["motions"] = execution.moves.size();
+  document["path_length_m"] = execution.path_length_m;
+  document["sim_time_s"] = execution.sim_time_s;
+  document["localization_time_s"] = execution.localization_time_s;
+  document["ladder"] = LadderJson(execution);
+  return document;
 }
 
 }  // namespace
