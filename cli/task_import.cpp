@@ -139,27 +139,27 @@ evaluation::ImportOptions OptionsFrom(const Flags& flags) {
 
 void Print(const evaluation::ImportedTask& task, const std::string& verdict) {
   const cad::Mating& m = task.mating;
-  Print("task           {}\n", task.task_file.string());
-  Print("tool           {} ({}; {} triangles, {} convex pieces)\n", task.tool.file, task.tool.unit,
-        task.tool.checked.mesh.size(), task.tool.pieces.size());
-  Print("target         {} ({}; {} triangles, {} convex pieces)\n", task.target.file, task.target.unit,
-        task.target.checked.mesh.size(), task.target.pieces.size());
-  Print("clearance      {:.4f} x {:.4f} mm a side (pieces: {:.4f} x {:.4f})\n", 1000 * m.clearance_m.x(),
-        1000 * m.clearance_m.y(), 1000 * task.pieces_clearance_m.x(), 1000 * task.pieces_clearance_m.y());
-  Print("lead-in        {:.4f} x {:.4f} mm\n", 1000 * m.lead_in_m.x(), 1000 * m.lead_in_m.y());
-  Print("depth          {:.4f} mm{}\n", 1000 * m.depth_m, m.through ? ", through" : "");
-  Print("deviation      tool {:.4f} mm, target {:.4f} mm where they mate; {:.4f} and {:.4f} anywhere\n",
-        1000 * task.tool.mating.largest_m(), 1000 * task.target.mating.largest_m(),
-        1000 * task.tool.anywhere.largest_m(), 1000 * task.target.anywhere.largest_m());
-  Print("cell           {:.4g} mm, margin {:.3f} cells\n", 1000 * task.content.numbers.cell_m,
-        task.content.numbers.margin_cells);
-  for (const std::string& note : task.notes) Print("note           {}\n", note);
-  Print("verdict        {}\n", verdict);
+  cli::Print("task           {}\n", task.task_file.string());
+  cli::Print("tool           {} ({}; {} triangles, {} convex pieces)\n", task.tool.file, task.tool.unit,
+             task.tool.checked.mesh.size(), task.tool.pieces.size());
+  cli::Print("target         {} ({}; {} triangles, {} convex pieces)\n", task.target.file, task.target.unit,
+             task.target.checked.mesh.size(), task.target.pieces.size());
+  cli::Print("clearance      {:.4f} x {:.4f} mm a side (pieces: {:.4f} x {:.4f})\n", 1000 * m.clearance_m.x(),
+             1000 * m.clearance_m.y(), 1000 * task.pieces_clearance_m.x(), 1000 * task.pieces_clearance_m.y());
+  cli::Print("lead-in        {:.4f} x {:.4f} mm\n", 1000 * m.lead_in_m.x(), 1000 * m.lead_in_m.y());
+  cli::Print("depth          {:.4f} mm{}\n", 1000 * m.depth_m, m.through ? ", through" : "");
+  cli::Print("deviation      tool {:.4f} mm, target {:.4f} mm where they mate; {:.4f} and {:.4f} anywhere\n",
+             1000 * task.tool.mating.largest_m(), 1000 * task.target.mating.largest_m(),
+             1000 * task.tool.anywhere.largest_m(), 1000 * task.target.anywhere.largest_m());
+  cli::Print("cell           {:.4g} mm, margin {:.3f} cells\n", 1000 * task.content.numbers.cell_m,
+             task.content.numbers.margin_cells);
+  for (const std::string& note : task.notes) cli::Print("note           {}\n", note);
+  cli::Print("verdict        {}\n", verdict);
 }
 
 void Import(const Flags& flags, Session& session) {
   const evaluation::ImportOptions options = OptionsFrom(flags);
-  const Parallelism jobs = ParseJobs(flags.jobs);
+  const Parallelism jobs = Parallelism(flags.jobs);
   if (flags.episodes < 1) throw InputError("--episodes", "fewer than 1", "use --no-trial for none");
   const evaluation::ImportedTask task = evaluation::ImportTask(options);
   std::optional<evaluation::Trial> trial;

@@ -12,9 +12,9 @@ concept HasShares = requires(Model& model, std::uint32_t b) {
   model.ForEachShare(*model.Actions(b).begin(), [](std::uint32_t, double) {});
 };
 
-/// Calls f(successor, share) for each outcome of an action that is no goal. Models whose beliefs carry their probability
-/// as a weight list successors (ForEachSuccessor; all shares are 1), models of normalised beliefs list them with the
-/// probability of the outcome (ForEachShare).
+/// Calls f(successor, share) for each outcome of an action that is no goal. Models whose beliefs carry their
+/// probability as a weight list successors (ForEachSuccessor; all shares are 1), models of normalised beliefs list them
+/// with the probability of the outcome (ForEachShare).
 template <class Model, class Action, class F>
 void ForEachShareOf(Model& model, const Action& action, F f) {
   if constexpr (HasShares<Model>) {
@@ -33,8 +33,8 @@ void ForEachShareOf(Model& model, const Action& action, F f) {
 /// V(b_a^z), and whole numbers stay whole. Or weights are 1 and successors come with shares: Q(b,a) = C(b,a) + sum_z
 /// share(z) V(b_a^z), shares summing to at most 1 (less by what reaches a goal).
 ///
-/// Laws: Start() is no goal and has a finite value; successors are no goals (their value is zero, or part of the cost of
-/// the action, so they are left out); actions never cost nothing without changing the belief.
+/// Laws: Start() is no goal and has a finite value; successors are no goals (their value is zero, or part of the cost
+/// of the action, so they are left out); actions never cost nothing without changing the belief.
 template <class Model>
 concept BeliefModel = requires(Model& model, std::uint32_t b) {
   { model.Start() } -> std::convertible_to<std::uint32_t>;

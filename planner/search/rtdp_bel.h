@@ -22,8 +22,9 @@ namespace feeler::planner {
 ///
 /// Convergence: a belief is *solved* when every belief reachable from it by greedy actions satisfies V(b) = Q(b, a) (up
 /// to rounding); its greedy action is frozen there and then, and its value never changes again. Along frozen actions
-/// V(b) = C(b,a) + sum P V(b'), so the frozen policy is acyclic where beliefs only shrink, as in lattice problems (a cycle
-/// would cost nothing), and costs V(b) <= epsilon V*(b), up to rounding; in general POMDPs it may return to a belief. The labelling procedure is LRTDP's CheckSolved (Bonet and Geffner 2003).
+/// V(b) = C(b,a) + sum P V(b'), so the frozen policy is acyclic where beliefs only shrink, as in lattice problems (a
+/// cycle would cost nothing), and costs V(b) <= epsilon V*(b), up to rounding; in general POMDPs it may return to a
+/// belief. The labelling procedure is LRTDP's CheckSolved (Bonet and Geffner 2003).
 ///
 /// Beside V the algorithm keeps L, started at heur and never inflated, backed up with the same actions: a lower bound
 /// at any time.
@@ -132,9 +133,8 @@ class RtdpBel {
   Belief SampleSuccessor(Belief b, int action) {
     double open = 0.0;
     const auto& chosen = model_.Actions(b)[static_cast<std::size_t>(action)];
-    ForEachShareOf(model_, chosen, [&](Belief next, double share) {
-      open += Solved(next) ? 0.0 : share * model_.Weight(next);
-    });
+    ForEachShareOf(model_, chosen,
+                   [&](Belief next, double share) { open += Solved(next) ? 0.0 : share * model_.Weight(next); });
     if (open == 0.0) return kGoalOrSolved;
     if constexpr (HasShares<Model>) {
       double left = model_.Weight(b);

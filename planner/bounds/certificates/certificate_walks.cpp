@@ -113,9 +113,8 @@ void FillCertificates(const CertificateWalks& walks, int bits, std::uint16_t* pl
     });
     std::uint16_t* const plane = planes + mask * cells;
     for (std::size_t i = 0; i < cells; ++i) {
-      plane[i] = cost[i] == kNoWalk
-                     ? kNoCertificate
-                     : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNoCertificate - 1));
+      plane[i] = cost[i] == kNoWalk ? kNoCertificate
+                                    : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNoCertificate - 1));
     }
   }
 }
