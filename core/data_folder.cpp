@@ -65,7 +65,7 @@ std::vector<fs::path> Candidates(const std::string& name) {
 
 fs::path FindData(const std::string& name) {
   std::error_code error;
-  if (const fs::path models = FromEnvironment("FEELER_MODELS"); name == "models" && !models.empty()) {
+  if (fs::path models = FromEnvironment("FEELER_MODELS"); name == "models" && !models.empty()) {
     if (fs::is_directory(models, error)) return models;
     throw InputError(models.string(), "FEELER_MODELS names no folder", "let it name a folder with tasks/ in it");
   }
