@@ -11,6 +11,7 @@
 #include <iterator>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/contact/contact_map_file.h"
 #include "tests/env/task_text.h"
 
 namespace feeler::env {
@@ -82,17 +83,17 @@ TEST_F(ContactMapCache, DamagedFilesAreFoundAndReplaced) {
   }
   for (const std::string& bytes : damaged) {
     Write(file, bytes);
-    EXPECT_THROW(ReadContactMap(file), InputError);
+    EXPECT_THROW(planner::ReadContactMap(file), InputError);
     EXPECT_TRUE(Equal(GetContactMap(peg_, Opening::kClosed), built));
     EXPECT_EQ(Read(file), good);
   }
-  EXPECT_THROW(ReadContactMap(folder_ / "absent"), InputError);
+  EXPECT_THROW(planner::ReadContactMap(folder_ / "absent"), InputError);
 }
 
 TEST_F(ContactMapCache, UnwritableFolderIsNotFatal) {
   Write(folder_, "a file where the folder should be");
   EXPECT_TRUE(Equal(GetContactMap(peg_, Opening::kClosed), BuildContactMap(peg_, Opening::kClosed)));
-  EXPECT_FALSE(StoreContactMap(folder_ / "map", BuildContactMap(peg_, Opening::kClosed)));
+  EXPECT_THROW(planner::WriteContactMap(folder_ / "map", BuildContactMap(peg_, Opening::kClosed)), InputError);
 }
 
 TEST_F(ContactMapCache, FolderFollowsTheEnvironment) {

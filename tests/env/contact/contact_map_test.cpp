@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "feeler/core/error.h"
+#include "feeler/core/lattice_grid.h"
 #include "feeler/core/random.h"
 #include "feeler/env/contact/contact_map_builder.h"
 #include "feeler/env/contact/lattice_phase.h"
@@ -54,15 +55,6 @@ Cell RandomCell(RandomStream& random, const CellBox& box) {
     cell[axis] = box.min[axis] + static_cast<int>(random.Index(static_cast<std::uint64_t>(box.Size()[axis])));
   }
   return cell;
-}
-
-template <class Visit>
-void ForEachCell(const CellBox& box, const Visit& visit) {
-  for (int z = box.min.z(); z <= box.max.z(); ++z) {
-    for (int y = box.min.y(); y <= box.max.y(); ++y) {
-      for (int x = box.min.x(); x <= box.max.x(); ++x) visit(Cell(x, y, z));
-    }
-  }
 }
 
 TEST(ContactMap, BoxAgainstBoxIsAnalytic) {
