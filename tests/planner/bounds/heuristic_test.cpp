@@ -27,7 +27,7 @@ std::vector<Hypothesis> Select(const Problem& problem, const std::vector<int>& m
 }
 
 /// Mean of h / V* that the bounds reach at least on these problems, whatever costs, weights and goal: what a bound is
-/// worth is a law of it too (zero is admissible and consistent). Four fifths of the least that was measured.
+/// worth is a law of it too (zero is admissible and consistent). The floors are round numbers below what was measured.
 double LeastTightness(HeuristicKind kind) {
   switch (kind) {
     case HeuristicKind::kCertificate: return 0.5;
