@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "feeler/cli/commands.h"
-#include "feeler/cli/console.h"
-#include "feeler/cli/numbers.h"
-#include "feeler/cli/outputs.h"
-#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/common/console.h"
+#include "feeler/cli/common/numbers.h"
+#include "feeler/cli/common/outputs.h"
+#include "feeler/cli/common/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "feeler/cli/console.h"
+#include "feeler/cli/common/console.h"
 
 namespace feeler::cli {
 

@@ -14,8 +14,8 @@
 #include <system_error>
 
 #include "feeler/cli/commands.h"
-#include "feeler/cli/console.h"
-#include "feeler/cli/signals.h"
+#include "feeler/cli/common/console.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/core/interrupted.h"

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "feeler/cli/console.h"
+#include "feeler/cli/common/console.h"
 #include "feeler/core/file_output.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/policy/policy_graph.h"

@@ -7,9 +7,9 @@
 #include <system_error>
 
 #include "feeler/cli/commands.h"
-#include "feeler/cli/console.h"
-#include "feeler/cli/numbers.h"
-#include "feeler/cli/outputs.h"
+#include "feeler/cli/common/console.h"
+#include "feeler/cli/common/numbers.h"
+#include "feeler/cli/common/outputs.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/core/printable.h"

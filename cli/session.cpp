@@ -1,6 +1,6 @@
 #include "feeler/cli/session.h"
 
-#include "feeler/cli/console.h"
+#include "feeler/cli/common/console.h"
 #include "feeler/core/interrupted.h"
 
 namespace feeler::cli {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/common/progress_bar.h"
 #include "feeler/core/progress.h"
 
 namespace feeler::cli {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "feeler/cli/numbers.h"
+#include "feeler/cli/common/numbers.h"
 #include "feeler/core/error.h"
 
 namespace feeler::cli {

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "feeler/cad/readers/read_part.h"
-#include "feeler/cli/console.h"
-#include "feeler/cli/numbers.h"
-#include "feeler/cli/outputs.h"
-#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/common/console.h"
+#include "feeler/cli/common/numbers.h"
+#include "feeler/cli/common/outputs.h"
+#include "feeler/cli/common/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/evaluation/cad_import/import_report.h"
@@ -87,7 +87,7 @@ Pose ParsePose(const std::string& flag, const std::string& text) {
     const std::string& part = parts[static_cast<std::size_t>(3 + k)];
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), q[k]);
     if (error != std::errc() || end != part.data() + part.size())
-      throw InputError(flag, fmt::format("\"{}\" is not a number", part));
+      throw InputError(flag, fmt::format("\"{}\" is not a number", part), "separate numbers with commas");
   }
   if (!(std::abs(q.norm() - 1) < 1e-3))
     throw InputError(flag, "the quaternion is not of length 1", "write qw,qx,qy,qz");

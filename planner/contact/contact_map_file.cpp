@@ -142,7 +142,8 @@ ContactMap ReadContactMap(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string bytes(error ? 0 : static_cast<std::size_t>(size), '\0');
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (error || !in) throw InputError(file.string(), "the contact map cannot be read");
+  if (error || !in)
+    throw InputError(file.string(), "the contact map cannot be read", "check that the file is there and may be read");
   return DecodeContactMap(bytes, file.string());
 }
 

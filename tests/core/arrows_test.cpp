@@ -140,21 +140,26 @@ TEST(Arrows, NoFolderHoldsMoreThanThirtyFiles) {
 TEST(Arrows, LinkLinesFollowTheArrows) {
   std::ifstream in(fs::path(FEELER_SOURCE_DIR) / "CMakeLists.txt");
   const std::string text((std::istreambuf_iterator<char>(in)), {});
-  const std::regex line("feeler_room\\(([a-z]+)([^)]*)\\)");
-  const std::regex link("feeler::([a-z]+)");
-  int rooms = 0;
+  const std::regex line("feeler_target\\(([a-z_]+)([^)]*)\\)");
+  const std::regex rooms_of("ROOMS((?:\\s+[a-z_]+)+)");
+  const std::regex word("[a-z_]+");
+  // Parts of a room that have a target of their own are named ROOM_PART.
+  const auto room_of = [](const std::string& target) { return target.substr(0, target.find('_')); };
+  std::set<std::string> rooms;
   for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it) {
-    const std::string room = (*it)[1];
-    if (!MayUse().contains(room)) continue;
-    ++rooms;
-    const std::string links = (*it)[2];
-    for (std::sregex_iterator l(links.begin(), links.end(), link); l != end; ++l) {
-      const std::string used = (*l)[1];
-      if (!MayUse().contains(used)) continue;
-      EXPECT_TRUE(MayUse().at(room).contains(used)) << room << " links " << used;
+    const std::string room = room_of((*it)[1]);
+    ASSERT_TRUE(MayUse().contains(room)) << room;
+    rooms.insert(room);
+    const std::string arguments = (*it)[2];
+    std::smatch found;
+    if (!std::regex_search(arguments, found, rooms_of)) continue;
+    const std::string used_rooms = found[1];
+    for (std::sregex_iterator used(used_rooms.begin(), used_rooms.end(), word); used != end; ++used) {
+      const std::string other = room_of((*used)[0]);
+      EXPECT_TRUE(other == room || MayUse().at(room).contains(other)) << room << " links " << other;
     }
   }
-  EXPECT_EQ(rooms, static_cast<int>(MayUse().size()));
+  EXPECT_EQ(rooms.size(), MayUse().size());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "feeler/cli/signals.h"
+#include "feeler/cli/common/signals.h"
 
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-#include "feeler/cli/outputs.h"
+#include "feeler/cli/common/outputs.h"
 
 #include <sys/stat.h>
 #include <unistd.h>

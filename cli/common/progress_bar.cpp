@@ -1,4 +1,4 @@
-#include "feeler/cli/progress_bar.h"
+#include "feeler/cli/common/progress_bar.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "feeler/cli/console.h"
+#include "feeler/cli/common/console.h"
 
 namespace feeler::cli {
 namespace {

@@ -1,4 +1,4 @@
-#include "feeler/cli/numbers.h"
+#include "feeler/cli/common/numbers.h"
 
 #include <fmt/format.h>
 

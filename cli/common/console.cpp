@@ -1,4 +1,4 @@
-#include "feeler/cli/console.h"
+#include "feeler/cli/common/console.h"
 
 #include <fcntl.h>
 #include <unistd.h>
