@@ -31,6 +31,10 @@ TEST(ParseFaults, CombinesNamesAndRefusesContradictions) {
       EXPECT_THROW(ParseFaults(name), InputError) << name;
       name.replace(number, std::string::npos, name.starts_with("stiffness") ? "20000" : "3");
     }
+    if (const std::size_t range = name.find("FROM..TO"); range != std::string::npos) {
+      EXPECT_THROW(ParseFaults(name), InputError) << name;
+      name.replace(range, std::string::npos, "0.5..2.5");
+    }
     EXPECT_NO_THROW(ParseFaults(name)) << name;
   }
   for (const char* bad : {"", "loud", "yaw-1,yaw-2", "outside,fall-in", "friction,friction", "ideal,"}) {
