@@ -36,8 +36,9 @@ TEST(Machine, RefusedMemoryAndThreadsAreOneLine) {
       {"preprocess", "--task", "plug", "--family", "2..3x2..3x2", "--jobs", "1000", "--out",
        ScratchFolder("machine") + "/x.db"}};
   for (const auto& command : commands) {
-    for (const rlim_t megabytes : {250, 400, 1000}) {
+    for (const rlim_t megabytes : {250, 400, 1000}) {  // below what the libraries take the loader refuses
       const CommandResult result = RunFeeler(command, [megabytes] { LimitMemory(megabytes << 20); });
+      if (result.exit_code == 127 && result.err.find("loading shared libraries") != std::string::npos) continue;
       EXPECT_LE(result.exit_code, 1) << command[0] << megabytes << result.err;
       EXPECT_EQ(result.err.find("terminate called"), std::string::npos) << result.err;
       EXPECT_EQ(result.err.find("internal"), std::string::npos) << result.err;
