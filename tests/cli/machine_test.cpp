@@ -81,6 +81,7 @@ TEST(Machine, PathsThatCannotBeReachedAreNamed) {
     for (const auto& command : commands) {
       const bool writes_to_root = path.empty() && command.back().starts_with("/");
       if (writes_to_root || (path.empty() && command.back() == folder + "/x.db")) continue;
+      if (command.back().starts_with("t.xml/")) continue;  // a place that could be made
       const CommandResult result = RunFeeler(command);
       EXPECT_EQ(result.exit_code, 2) << command[0] << " " << command[1] << " " << path << result.err;
       EXPECT_TRUE(LastLine(result.err).starts_with("feeler: error: ")) << command[0] << result.err;

@@ -93,7 +93,7 @@ std::string FindChromium() {
 BrowserAnswer OpenPage(const std::string& page_file, const std::string& scratch_folder, int width, int height) {
   std::string page = Slurp(page_file);
   const std::string script =
-      "<script>\n" + Slurp(FEELER_SOURCE_DIR "/tests/evaluation/report_page_check.js") + "</script>";
+      "<script>\n" + Slurp(FEELER_SOURCE_DIR "/tests/evaluation/report/report_page_check.js") + "</script>";
   page.insert(page.rfind("</body>"), script);
   const std::string checked = fs::absolute(scratch_folder + "/checked.html").string();
   std::ofstream(checked, std::ios::binary) << page;
