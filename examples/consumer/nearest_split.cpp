@@ -46,7 +46,9 @@ class NearestSplit {
         planner::PolicyBranch branch;
         branch.outcome.cells = answer.first;
         branch.outcome.contact = answer.second;
-        for (const Hypothesis& h : left) branch.probability += h.weight / weight;
+        // Summed before divided: the only answer has probability 1 exactly.
+        for (const Hypothesis& h : left) branch.probability += h.weight;
+        branch.probability /= weight;
         branch.next = Node(robot + answer.first * UnitCell(node.move.direction), left);
         node.expected_cost +=
             branch.probability * (problem_.cost.Of(branch.outcome) + graph_.nodes[branch.next].expected_cost);
