@@ -56,6 +56,8 @@ function(feeler_install_component name rooms libraries)
   endforeach()
   feeler_pkgconfig_of("${libraries}" modules FEELER_PC_LIBS FEELER_PC_CFLAGS)
   string(APPEND FEELER_PC_REQUIRES "${modules}")
+  # Relative: `cmake --install --prefix` and packages put the tree elsewhere than it was configured for.
+  file(RELATIVE_PATH FEELER_PC_INCLUDEDIR ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_FULL_INCLUDEDIR})
   configure_file(${PROJECT_SOURCE_DIR}/cmake/feeler.pc.in ${PROJECT_BINARY_DIR}/pkgconfig/feeler-${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/pkgconfig/feeler-${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()

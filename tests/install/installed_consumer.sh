@@ -38,6 +38,12 @@ opened=$(cat trace.* | grep -v ENOENT | grep -E "\"($source_dir|$build)/" | head
 [ -z "$opened" ] || fail "opened in the source or build tree: $opened"
 if ldd b/next_move | grep -iE 'mujoco|EGL|opencv'; then fail "next_move links a simulator"; fi
 
+# pkg-config alone builds a program: its paths follow the prefix.
+pc=$(dirname "$(find "$prefix" -name feeler-core.pc)")
+printf '#include "feeler/core/random.h"\n#include "feeler/version.h"\nint main() { return feeler::RandomStream(1, 2, "pc").Uniform(0.0, 1.0) < 0.0; }\n' >pc.cpp
+PKG_CONFIG_PATH=$pc sh -c 'g++ -std=c++20 pc.cpp -o pc $(pkg-config --cflags --libs feeler-core)' >pc.log 2>&1 && ./pc ||
+  { cat pc.log >&2; fail "a build by pkg-config"; }
+
 refused() {  # PATTERN LINE-OF-CMAKE
   mkdir -p refused
   printf 'cmake_minimum_required(VERSION 3.25)\nproject(refused LANGUAGES CXX)\n%s\n' "$2" >refused/CMakeLists.txt
