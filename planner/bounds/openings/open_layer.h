@@ -38,7 +38,10 @@ struct OpenLayer {
       std::numeric_limits<double>::infinity();  ///< places of splits at least so far away are not looked at
 
   /// Steps that looking into so many openings takes at least.
-  double StepsOf(std::size_t looks) const { return static_cast<double>(static_cast<int>(looks) / each); }
+  double StepsOf(std::size_t looks) const {
+    const int whole = static_cast<int>(looks) / each;
+    return whole;
+  }
 };
 
 inline int Distance(const Cell& a, const Cell& b) { return (a - b).cwiseAbs().sum(); }

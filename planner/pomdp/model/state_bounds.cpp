@@ -87,7 +87,7 @@ class Sweeper {
         }
         double total = 0.0;
         std::ranges::sort(seen);
-        seen.erase(std::ranges::unique(seen).begin(), seen.end());
+        seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
         for (const std::uint32_t o : seen) {
           double* sum = sums_.data() + o * q.size();
           total += *std::max_element(sum, sum + q.size());
