@@ -143,7 +143,7 @@ TEST_F(Perceive, SaysWhatIsWrong) {
   WriteFile(
       File("packed.pcd"),
       "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA binary_compressed\nabc");
-  ExpectRefused({"--cloud", File("packed.pcd")}, 2, "binary_compressed");
+  ExpectRefused({"--cloud", File("packed.pcd")}, 2, "packed.pcd: is cut off");
   ExpectRefused({"--cloud", File("none.ply")}, 2, "none.ply");
   ExpectRefused({}, 2, "--depth");
 

@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "feeler/perception/depth_file.h"
+#include "feeler/perception/uncertainty_table.h"
 #include "feeler/planner/belief/lattice_problem.h"
 #include "feeler/planner/solve.h"
 #include "feeler/policies/io/lattice_problem_file.h"
@@ -52,9 +53,19 @@ std::vector<std::string> DepthImages() {
   return {perception::EncodeDepthPng(frame, 1e-3)};
 }
 
-const std::string kTable =
-    R"({"kind":"feeler uncertainty table","version":1,"task":"plug","fingerprint":"0","axes":[{"axis":"x","resolution":0.002,)"
-    R"("min_cells":2,"max_cells":15}],"camera_m":[0.1,0.2,0.9],"averaged_frames":10,"rules":[],"plain_rules":[]})";
+std::string Table() {
+  perception::UncertaintyTable table;
+  table.task = "plug";
+  table.fingerprint = "0";
+  table.axes = {{AxisKind::kX, 0.002, 2, 15}, {AxisKind::kY, 0.002, 2, 15}};
+  table.camera_m = {0.1, 0.2, 0.9};
+  table.averaged_frames = 10;
+  for (const double nearest : {0.5, 0.8}) {
+    table.rules.push_back({nearest, nearest + 0.3, {0.001, -0.002, 0.0}, Eigen::Vector2d(0.004, 0.006), 40});
+  }
+  table.plain_rules = table.rules;
+  return perception::ToJson(table);
+}
 
 }  // namespace
 
@@ -66,7 +77,7 @@ std::vector<std::string> Seeds(const Reader& reader) {
   if (name == "cloud") return Clouds();
   if (name == "depth") return DepthImages();
   if (name == "intrinsics") return {perception::ToJson(perception::CameraIntrinsics{640, 480, 600, 600, 320, 240})};
-  if (name == "table") return {kTable};
+  if (name == "table") return {Table()};
   return ProblemFiles();
 }
 

@@ -314,7 +314,7 @@ TEST_F(DatabaseTest, NamesForeignAndUnknownVersions) {
   std::filesystem::remove(path());
   { Database::Create(path(), Identity()); }
   execute("PRAGMA user_version=4");
-  EXPECT_THAT(reading(), HasSubstr("version 3"));
+  EXPECT_THAT(reading(), HasSubstr("is a database of version 4, this feeler reads versions 1 to 3"));
   execute("PRAGMA user_version=3; ALTER TABLE problems RENAME COLUMN seed TO grain");
   EXPECT_THAT(reading(), HasSubstr("table problems"));
   execute(
