@@ -52,9 +52,7 @@ void AddGeom(XMLElement& worldbody, const char* name, const char* pos, const cha
   geom.SetAttribute("group", 0);
 }
 
-}  // namespace
-
-void AddDecor(bool workbench, XMLElement& mujoco) {
+void AddMaterials(XMLElement& mujoco) {
   XMLElement& asset = *mujoco.InsertNewChildElement("asset");
   Add(asset, "material",
       {{"name", "gripper_body"}, {"rgba", "0.16 0.17 0.19 1"}, {"specular", "0.5"}, {"shininess", "0.6"}});
@@ -93,7 +91,9 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
          {"width", "256"},
          {"height", "1536"}});
   }
+}
 
+void AddVisual(XMLElement& mujoco) {
   XMLElement& visual = *mujoco.InsertNewChildElement("visual");
   Add(visual, "global", {{"offwidth", "1920"}, {"offheight", "1200"}});
   Add(visual, "headlight", {{"ambient", "0.34 0.34 0.34"}, {"diffuse", "0.32 0.32 0.32"}, {"specular", "0.1 0.1 0.1"}});
@@ -102,9 +102,9 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
 
   // The region that shadows cover and the unit of the near and far planes.
   Add(mujoco, "statistic", {{"center", "0.45 0 0.3"}, {"extent", "1"}});
+}
 
-  XMLElement& worldbody = *mujoco.FirstChildElement("worldbody");
-  const Furniture furniture = FurnitureOf(worldbody);
+void AddLights(XMLElement& worldbody) {
   if (worldbody.FirstChildElement("light") == nullptr) {
     Add(worldbody, "light",
         {{"name", "key"},
@@ -123,6 +123,16 @@ void AddDecor(bool workbench, XMLElement& mujoco) {
        {"diffuse", "0.20 0.21 0.23"},
        {"specular", "0.05 0.05 0.05"},
        {"castshadow", "false"}});
+}
+
+}  // namespace
+
+void AddDecor(bool workbench, XMLElement& mujoco) {
+  AddMaterials(mujoco);
+  AddVisual(mujoco);
+  XMLElement& worldbody = *mujoco.FirstChildElement("worldbody");
+  const Furniture furniture = FurnitureOf(worldbody);
+  AddLights(worldbody);
   if (!furniture.floor) {
     XMLElement& floor = Add(worldbody, "geom", {{"type", "plane"}, {"size", "4 4 0.1"}, {"material", "floor"}});
     floor.SetAttribute("name", "ground");

@@ -198,99 +198,111 @@ std::vector<std::pair<Cell, Direction>> OpenPolicy::Order(BeliefId b, TourKind k
   return order;
 }
 
-void OpenPolicy::Tour(BeliefId start, TourKind kind) {
-  // The stops of the tour, as long as nothing is found.
+/// What is made of a tour while nothing is found.
+struct OpenPolicy::Walk {
   std::vector<Stop> stops;
-  std::vector<std::size_t> looks;  // stops after which an opening has just been looked into
-  // Canonical frames move as hypotheses go: places are kept relative to the tool.
-  BeliefId b = start;
+  std::vector<std::size_t> looks;  ///< stops after which an opening has just been looked into
+  BeliefId end = kNoBelief;
+  // Canonical frames move as hypotheses go: places are kept relative to the tool's first.
   Cell from_start = Cell::Zero();
-  const Cell origin = graph_.robot(start);
-  bool complete = false;
-  const auto make = [&](const GuardedMove& move) {
-    const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(b, move);
-    const BeliefOutcome* main = nullptr;
-    for (const BeliefOutcome& outcome : outcomes) {
-      if (outcome.next == kNoBelief || outcome.next == b) continue;
-      if (main == nullptr || outcome.weight > main->weight) main = &outcome;
-    }
-    if (main == nullptr) {
-      complete = outcomes.size() > 1;  // all that were left are told apart
-      if (complete) stops.push_back({b, move});
-      return false;
-    }
-    stops.push_back({b, move});
-    b = main->next;
-    from_start += main->outcome.cells * UnitCell(move.direction);
-    return true;
-  };
   bool going = true;
+  bool complete = false;  ///< all that were left are told apart at the last stop
+};
+
+bool OpenPolicy::Make(const GuardedMove& move, Walk& walk) {
+  const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(walk.end, move);
+  const BeliefOutcome* main = nullptr;
+  for (const BeliefOutcome& outcome : outcomes) {
+    if (outcome.next == kNoBelief || outcome.next == walk.end) continue;
+    if (main == nullptr || outcome.weight > main->weight) main = &outcome;
+  }
+  if (main == nullptr) {
+    walk.complete = outcomes.size() > 1;
+    if (walk.complete) walk.stops.push_back({walk.end, move});
+    return false;
+  }
+  walk.stops.push_back({walk.end, move});
+  walk.end = main->next;
+  walk.from_start += main->outcome.cells * UnitCell(move.direction);
+  return true;
+}
+
+OpenPolicy::Walk OpenPolicy::WalkThroughOpenings(BeliefId start, TourKind kind) {
+  Walk walk;
+  walk.end = start;
+  const Cell origin = graph_.robot(start);
   for (const auto& [mouth, direction] : Order(start, kind)) {
     const Cell target = mouth - origin;
     for (const int axis : {2, 0, 1}) {
-      while (going && from_start[axis] != target[axis]) {
-        const int way = target[axis] - from_start[axis];
+      while (walk.going && walk.from_start[axis] != target[axis]) {
+        const int way = target[axis] - walk.from_start[axis];
         int cells = 1;
         for (const int listed : graph_.problem().move_lengths) {
           if (listed <= std::abs(way)) cells = listed;
         }
-        const Cell before = from_start;
-        going = make({MakeDirection(axis, way), cells});
-        if (from_start == before) going = false;  // in the way of something
+        const Cell before = walk.from_start;
+        walk.going = Make({MakeDirection(axis, way), cells}, walk);
+        if (walk.from_start == before) walk.going = false;  // in the way of something
       }
     }
-    if (!going) break;
-    going = make({direction, 1});
-    if (!going) break;
-    looks.push_back(stops.size());
-    if (from_start != target) break;  // found, with others left
+    if (!walk.going) break;
+    walk.going = Make({direction, 1}, walk);
+    if (!walk.going) break;
+    walk.looks.push_back(walk.stops.size());
+    if (walk.from_start != target) break;  // found, with others left
   }
-  // Where to leave it.
-  const std::size_t stride = looks.size() / kMostExits + 1;
-  std::vector<std::pair<std::size_t, BeliefId>> exits;
-  for (std::size_t i = stride - 1; i < looks.size(); i += stride) {
-    exits.emplace_back(looks[i], looks[i] < stops.size() ? stops[looks[i]].belief : b);
+  return walk;
+}
+
+std::optional<OpenPolicy::Exit> OpenPolicy::BestExit(const Walk& walk) {
+  // Where it may be left: after some of the looks, and after the last.
+  const std::size_t stride = walk.looks.size() / kMostExits + 1;
+  std::vector<Exit> exits;
+  for (std::size_t i = stride - 1; i < walk.looks.size(); i += stride) {
+    const std::size_t at = walk.looks[i];
+    exits.push_back({at, at < walk.stops.size() ? walk.stops[at].belief : walk.end});
   }
-  if (!looks.empty() && (exits.empty() || exits.back().first != looks.back()) && going) {
-    exits.emplace_back(looks.back(), b);
+  if (!walk.looks.empty() && (exits.empty() || exits.back().stop != walk.looks.back()) && walk.going) {
+    exits.push_back({walk.looks.back(), walk.end});
   }
-  // Cost of the tour from each stop to the end, and of the cheapest way to leave it.
-  std::size_t best_exit = stops.size();
-  double best = kInfinity;
+  // Cost of the tour from its start to each of them, and of the cheapest way to leave it.
+  std::optional<Exit> best;
+  double best_cost = kInfinity;
   double spent = 0.0;
   std::size_t stop = 0;
   const auto spend_to = [&](std::size_t end) {
     for (; stop < end; ++stop) {
-      for (const BeliefOutcome& outcome : graph_.Outcomes(stops[stop].belief, stops[stop].move)) {
+      for (const BeliefOutcome& outcome : graph_.Outcomes(walk.stops[stop].belief, walk.stops[stop].move)) {
         spent += outcome.weight * graph_.problem().cost.Of(outcome.outcome);
       }
     }
   };
-  BeliefId exit = kNoBelief;
-  for (const auto& [at, belief] : exits) {
-    spend_to(at);
-    if (spent >= best) break;
-    const double rest = FilledValue(belief);
-    if (spent + rest < best) {
-      best = spent + rest;
-      best_exit = at;
-      exit = belief;
+  for (const Exit& exit : exits) {
+    spend_to(exit.stop);
+    if (spent >= best_cost) break;
+    const double rest = FilledValue(exit.belief);
+    if (spent + rest < best_cost) {
+      best_cost = spent + rest;
+      best = exit;
     }
   }
-  spend_to(stops.size());
-  if (complete && spent <= best) {
-    best_exit = stops.size();
-    exit = kNoBelief;
-  } else if (exit == kNoBelief) {
-    return;
-  }
-  if (exit != kNoBelief) Find(exit, false);
-  for (std::size_t i = best_exit; i-- > 0;) {
-    const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(stops[i].belief, stops[i].move);
+  spend_to(walk.stops.size());
+  if (walk.complete && spent <= best_cost) best = Exit{walk.stops.size(), kNoBelief};
+  return best;
+}
+
+void OpenPolicy::Tour(BeliefId start, TourKind kind) {
+  const Walk walk = WalkThroughOpenings(start, kind);
+  const std::optional<Exit> exit = BestExit(walk);
+  if (!exit) return;
+  if (exit->belief != kNoBelief) Find(exit->belief, false);
+  for (std::size_t i = exit->stop; i-- > 0;) {
+    const Stop& stop = walk.stops[i];
+    const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(stop.belief, stop.move);
     for (const BeliefOutcome& outcome : outcomes) {
       if (outcome.next != kNoBelief && !Solved(outcome.next)) Find(outcome.next, false);
     }
-    Record(stops[i].belief, stops[i].move, outcomes);
+    Record(stop.belief, stop.move, outcomes);
   }
 }
 

@@ -75,7 +75,18 @@ class OpenPolicy {
   double FilledValue(BeliefId b);
   /// The openings of one layer's hypotheses, in an order of short steps.
   std::vector<std::pair<Cell, Direction>> Order(BeliefId b, TourKind kind) const;
+  struct Walk;
+  /// Where a tour is left: before `stop`, for the filled map's policy from `belief` (none: the tour is complete).
+  struct Exit {
+    std::size_t stop = 0;
+    BeliefId belief = kNoBelief;
+  };
+  /// Records the better of: the tour to its end, the tour up to the cheapest exit.
   void Tour(BeliefId b, TourKind kind);
+  Walk WalkThroughOpenings(BeliefId start, TourKind kind);
+  /// Goes on from `walk.end` by what is most likely; false where that leads nowhere.
+  bool Make(const GuardedMove& move, Walk& walk);
+  std::optional<Exit> BestExit(const Walk& walk);
   /// The move to make instead of `move`, so that openings on the way are looked into.
   GuardedMove WithLooks(BeliefId b, const GuardedMove& move, double value) const;
   /// Records the move at the belief if its value, with those of its outcomes, is less than what is known.

@@ -11,6 +11,9 @@
 namespace feeler::planner {
 namespace {
 
+/// Flags of a cell that no step leads out of.
+constexpr std::uint8_t kBlockedSteps = (1U << kDirectionCount) - 1;
+
 /// out(x) = OR over i < count of in(x - i) along an axis; cells before the first are like the first, beyond the last
 /// like the last.
 void OrAlong(int axis, int count, const Cell& in_size, const std::vector<std::uint8_t>& in, const Cell& out_size,
@@ -174,11 +177,9 @@ std::uint64_t CuboidTable::BestPartition(const Source& source, const std::vector
 }
 
 void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch) {
-  const ContactMasks& masks = source.masks;
   Plane& plane = planes_[PlaneIndex(size, orientation)];
   plane = Shape(size);
   const Cell& stored = plane.stored;
-  const auto strides = GridStrides(stored);
   // The OR over the cuboid of the flags of its hypotheses.
   Cell shape = active_.Size();
   scratch.flags = flags_[static_cast<std::size_t>(orientation)];
@@ -188,23 +189,28 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
     OrAlong(axis, size[axis], before, scratch.flags, shape, scratch.buffer);
     scratch.flags.swap(scratch.buffer);
   }
+  plane.values.assign(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
+                          static_cast<std::size_t>(stored.z()),
+                      kUnreachable);
+  SplittingSteps(source, size, orientation, plane, scratch);
+  SilentSteps(static_cast<std::uint32_t>(size.prod()) * free_units_, plane, scratch.flags);
+}
 
+void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int orientation, Plane& plane,
+                                 Scratch& scratch) const {
+  const ContactMasks& masks = source.masks;
+  const Cell& stored = plane.stored;
   const auto whole = static_cast<std::uint32_t>(size.prod());
-  const std::uint32_t step_cost = whole * free_units_;
   const Bits256 window = Rectangle(0, 0, size.x(), size.y());
   const auto depth = static_cast<std::size_t>(size.z());
   scratch.hit.resize(depth);
   scratch.missed.resize(depth);
-  plane.values.assign(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
-                          static_cast<std::size_t>(stored.z()),
-                      kUnreachable);
-  // Steps that split the cuboid.
   std::size_t at = 0;
   ForEachCell({Cell::Zero(), stored - Cell::Ones()}, [&](const Cell& cell) {
     const std::size_t here = at++;
     std::uint8_t& flags = scratch.flags[here];
     if ((flags & kOutOfReach) != 0) {
-      flags = 0x3F;
+      flags = kBlockedSteps;
       return;
     }
     const Cell displacement = active_.min + cell;
@@ -236,14 +242,16 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
       best = static_cast<std::uint32_t>(std::min<std::uint64_t>(best, value));
     }
   });
-  // Steps that show nothing, until nothing changes: values are settled by a few sweeps to and fro.
+}
+
+void CuboidTable::SilentSteps(std::uint32_t step_cost, Plane& plane, const std::vector<std::uint8_t>& flags) {
+  const auto strides = GridStrides(plane.stored);
   const auto relax = [&](std::size_t here) {
-    const unsigned flags = scratch.flags[here];
-    if (flags == 0x3F) return false;
+    if (flags[here] == kBlockedSteps) return false;
     const std::uint32_t before = plane.values[here];
     std::uint32_t best = before;
     for (const Direction d : kDirections) {
-      if ((flags >> IndexOf(d) & 1) != 0) continue;
+      if ((flags[here] >> IndexOf(d) & 1) != 0) continue;
       const std::uint32_t there = plane.values[static_cast<std::size_t>(
           static_cast<std::int64_t>(here) + SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))])];
       if (there < kUnreachable - step_cost) best = std::min(best, there + step_cost);

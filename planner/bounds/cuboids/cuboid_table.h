@@ -66,6 +66,10 @@ class CuboidTable {
   void FitIntoMemory(int orientations);
   void FillFlags(const ContactMap& map);
   void Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch);
+  /// Values where one step splits the cuboid; completes the flags (kBlockedSteps: nothing leads on from here).
+  void SplittingSteps(const Source& source, const Cell& size, int orientation, Plane& plane, Scratch& scratch) const;
+  /// Steps that show nothing, until nothing changes: values are settled by a few sweeps to and fro.
+  static void SilentSteps(std::uint32_t step_cost, Plane& plane, const std::vector<std::uint8_t>& flags);
   /// The best bound of a set of hypotheses (`layers`, emptied) over the partitions of it.
   std::uint64_t BestPartition(const Source& source, const std::vector<Bits256>& layers, const Cell& displacement,
                               int orientation, Scratch& scratch) const;

@@ -47,64 +47,101 @@ LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& 
     grid.size = grid.domain.Size();
     grid.cells = static_cast<std::size_t>(grid.domain.Count());
     grid.values.assign(grid.cells * static_cast<std::size_t>(grid.longest + 1) * orientations.size(), 0);
-    for (const int o : orientations) Fill(map, axis, o, spread[axis], free_units, contact_units);
+    for (const int o : orientations) Fill(map, axis, o, spread[axis], {free_units, contact_units});
   }
 }
 
-void LineTable::Fill(const ContactMap& map, int axis, int orientation, int spread, std::uint32_t free_units,
-                     std::uint32_t contact_units) {
-  Grid& grid = grids_[static_cast<std::size_t>(axis)];
+/// What a line meets at each cell of the grid. Bit i: under hypothesis i of the line, at `cell` - i along the axis.
+struct LineTable::LineBits {
+  std::vector<std::uint16_t> inside;                                ///< the cell is blocked
+  std::array<std::vector<std::uint16_t>, kDirectionCount> blocked;  ///< the step is
+  std::vector<std::uint8_t> leads;  ///< bit d: the next cell in direction d is in the domain
+};
+
+LineTable::LineBits LineTable::BitsOf(const ContactMap& map, const Grid& grid, int axis, int orientation) {
+  const std::int64_t along = GridStrides(grid.size)[static_cast<std::size_t>(axis)];
+  LineBits bits;
+  bits.inside.assign(grid.cells, 0);
+  bits.leads.assign(grid.cells, 0);
+  for (auto& of_direction : bits.blocked) of_direction.assign(grid.cells, 0);
+  std::size_t cell = 0;
+  ForEachCell(grid.domain, [&](const Cell& here) {
+    const bool first = here[axis] == grid.domain.min[axis];
+    const std::size_t before = first ? cell : cell - static_cast<std::size_t>(along);
+    const auto shifted = [&](const std::vector<std::uint16_t>& line, bool bit) {
+      // Before the domain's edge the line continues as it is at the edge.
+      const unsigned rest = first ? (bit ? 0xFFFFU : 0U) : static_cast<unsigned>(line[before]);
+      return static_cast<std::uint16_t>(rest << 1 | (bit ? 1U : 0U));
+    };
+    bits.inside[cell] = shifted(bits.inside, map.Blocked(here, orientation));
+    for (const Direction d : kDirections) {
+      auto& line = bits.blocked[static_cast<std::size_t>(IndexOf(d))];
+      line[cell] = shifted(line, !map.StepFree(here, d, orientation));
+      if (grid.domain.Contains(here + UnitCell(d))) bits.leads[cell] |= static_cast<std::uint8_t>(1U << IndexOf(d));
+    }
+    ++cell;
+  });
+  return bits;
+}
+
+std::uint32_t LineTable::RunsValue(const Grid& grid, const std::uint16_t* planes, std::int64_t along,
+                                   std::uint32_t bits, std::size_t at) {
+  std::uint32_t sum = 0;
+  for (int i = 0; bits >> i != 0;) {
+    if ((bits >> i & 1) == 0) {
+      ++i;
+      continue;
+    }
+    int length = 0;
+    while ((bits >> (i + length) & 1) != 0) ++length;
+    if (length >= 2) {
+      const std::uint16_t value =
+          planes[static_cast<std::size_t>(length) * grid.cells + at - static_cast<std::size_t>(i * along)];
+      if (value == kUnreachable) return kInfinite;
+      sum += value;
+    }
+    i += length;
+  }
+  return sum;
+}
+
+void LineTable::SplittingSteps(const Grid& grid, const LineBits& bits, int axis, int length, const StepUnits& units,
+                               const std::uint16_t* planes, std::vector<std::uint32_t>& cost,
+                               std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds) {
   const std::array<std::int64_t, 3> strides = GridStrides(grid.size);
   const std::int64_t along = strides[static_cast<std::size_t>(axis)];
-  // Bit i: the step is blocked (the cell is blocked) at `cell` - i along the axis, that is under hypothesis i of the
-  // line.
-  std::array<std::vector<std::uint16_t>, kDirectionCount> blocked;
-  std::vector<std::uint16_t> inside(grid.cells, 0);
-  std::vector<std::uint8_t> leads(grid.cells, 0);  // bit d: the next cell in direction d is in the domain
-  for (auto& bits : blocked) bits.assign(grid.cells, 0);
-  std::size_t cell = 0;
-  for (int z = grid.domain.min.z(); z <= grid.domain.max.z(); ++z) {
-    for (int y = grid.domain.min.y(); y <= grid.domain.max.y(); ++y) {
-      for (int x = grid.domain.min.x(); x <= grid.domain.max.x(); ++x, ++cell) {
-        const Cell here(x, y, z);
-        const bool first = here[axis] == grid.domain.min[axis];
-        const std::size_t before = first ? cell : cell - static_cast<std::size_t>(along);
-        const auto shifted = [&](const std::vector<std::uint16_t>& bits, bool bit) {
-          // Before the domain's edge the line continues as it is at the edge.
-          const unsigned rest = first ? (bit ? 0xFFFFU : 0U) : static_cast<unsigned>(bits[before]);
-          return static_cast<std::uint16_t>(rest << 1 | (bit ? 1U : 0U));
-        };
-        inside[cell] = shifted(inside, map.Blocked(here, orientation));
-        for (const Direction d : kDirections) {
-          auto& bits = blocked[static_cast<std::size_t>(IndexOf(d))];
-          bits[cell] = shifted(bits, !map.StepFree(here, d, orientation));
-          if (grid.domain.Contains(here + UnitCell(d))) leads[cell] |= static_cast<std::uint8_t>(1U << IndexOf(d));
-        }
-      }
+  const auto whole = static_cast<std::uint32_t>((std::uint32_t{1} << length) - 1);
+  for (std::size_t at = 0; at < grid.cells; ++at) {
+    if ((bits.inside[at] & whole) != 0) continue;
+    for (const Direction d : kDirections) {
+      const std::uint32_t hit = bits.blocked[static_cast<std::size_t>(IndexOf(d))][at] & whole;
+      if (hit == 0 || hit == whole) continue;
+      // Near the edge of the domain lines are the same further in; there is no need to look at them here.
+      const std::int64_t position = static_cast<std::int64_t>(at) / along % grid.size[axis];
+      if (position < length) continue;
+      const std::uint32_t missed = whole & ~hit;
+      const bool stays = (bits.leads[at] >> IndexOf(d) & 1) == 0;
+      const std::int64_t step = stays ? 0 : SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))];
+      const std::uint32_t after_hit = RunsValue(grid, planes, along, hit, at);
+      const std::uint32_t after_miss =
+          RunsValue(grid, planes, along, missed, static_cast<std::size_t>(static_cast<std::int64_t>(at) + step));
+      if (after_hit == kInfinite || after_miss == kInfinite) continue;
+      const std::uint32_t value = after_hit + after_miss +
+                                  static_cast<std::uint32_t>(std::popcount(hit)) * units.contact +
+                                  static_cast<std::uint32_t>(std::popcount(missed)) * units.free;
+      if (value >= cost[at]) continue;
+      cost[at] = value;
+      seeds.emplace_back(value, static_cast<std::uint32_t>(at));
     }
   }
+}
 
+void LineTable::Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units) {
+  Grid& grid = grids_[static_cast<std::size_t>(axis)];
+  const std::array<std::int64_t, 3> strides = GridStrides(grid.size);
+  const LineBits bits = BitsOf(map, grid, axis, orientation);
   const int place = place_[static_cast<std::size_t>(orientation)];
   std::uint16_t* const planes = &grid.values[static_cast<std::size_t>(place * (grid.longest + 1)) * grid.cells];
-  const auto runs_value = [&](std::uint32_t bits, std::size_t at) {
-    std::uint32_t sum = 0;
-    for (int i = 0; bits >> i != 0;) {
-      if ((bits >> i & 1) == 0) {
-        ++i;
-        continue;
-      }
-      int length = 0;
-      while ((bits >> (i + length) & 1) != 0) ++length;
-      if (length >= 2) {
-        const std::uint16_t value =
-            planes[static_cast<std::size_t>(length) * grid.cells + at - static_cast<std::size_t>(i * along)];
-        if (value == kUnreachable) return kInfinite;
-        sum += value;
-      }
-      i += length;
-    }
-    return sum;
-  };
   std::vector<std::uint32_t> cost(grid.cells);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> seeds;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> queue;
@@ -112,40 +149,19 @@ void LineTable::Fill(const ContactMap& map, int axis, int orientation, int sprea
     std::uint16_t* const plane = planes + static_cast<std::size_t>(length) * grid.cells;
     if (length <= spread + 1) continue;  // a goal
     const auto whole = static_cast<std::uint32_t>((std::uint32_t{1} << length) - 1);
-    const std::uint32_t step_cost = free_units * static_cast<std::uint32_t>(length);
     std::ranges::fill(cost, kInfinite);
     seeds.clear();
-    for (std::size_t at = 0; at < grid.cells; ++at) {
-      if ((inside[at] & whole) != 0) continue;
-      for (const Direction d : kDirections) {
-        const std::uint32_t hit = blocked[static_cast<std::size_t>(IndexOf(d))][at] & whole;
-        if (hit == 0 || hit == whole) continue;
-        // Near the edge of the domain lines are the same further in; there is no need to look at them here.
-        const std::int64_t position = static_cast<std::int64_t>(at) / along % grid.size[axis];
-        if (position < length) continue;
-        const std::uint32_t missed = whole & ~hit;
-        const bool stays = (leads[at] >> IndexOf(d) & 1) == 0;
-        const std::int64_t step = stays ? 0 : SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))];
-        const std::uint32_t after_hit = runs_value(hit, at);
-        const std::uint32_t after_miss =
-            runs_value(missed, static_cast<std::size_t>(static_cast<std::int64_t>(at) + step));
-        if (after_hit == kInfinite || after_miss == kInfinite) continue;
-        const std::uint32_t value = after_hit + after_miss +
-                                    static_cast<std::uint32_t>(std::popcount(hit)) * contact_units +
-                                    static_cast<std::uint32_t>(std::popcount(missed)) * free_units;
-        if (value >= cost[at]) continue;
-        cost[at] = value;
-        seeds.emplace_back(value, static_cast<std::uint32_t>(at));
-      }
-    }
-    SpreadByEqualSteps(seeds, step_cost, cost, queue, [&](std::uint32_t at, auto relax) {
-      for (const Direction d : kDirections) {
-        if ((leads[at] >> IndexOf(Opposite(d)) & 1) == 0) continue;
-        const auto before = static_cast<std::uint32_t>(static_cast<std::int64_t>(at) -
-                                                       SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
-        if (((inside[before] | blocked[static_cast<std::size_t>(IndexOf(d))][before]) & whole) == 0) relax(before);
-      }
-    });
+    SplittingSteps(grid, bits, axis, length, units, planes, cost, seeds);
+    SpreadByEqualSteps(
+        seeds, units.free * static_cast<std::uint32_t>(length), cost, queue, [&](std::uint32_t at, auto relax) {
+          for (const Direction d : kDirections) {
+            if ((bits.leads[at] >> IndexOf(Opposite(d)) & 1) == 0) continue;
+            const auto before = static_cast<std::uint32_t>(static_cast<std::int64_t>(at) -
+                                                           SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
+            const std::uint32_t blocked = bits.blocked[static_cast<std::size_t>(IndexOf(d))][before];
+            if (((bits.inside[before] | blocked) & whole) == 0) relax(before);
+          }
+        });
     for (std::size_t i = 0; i < grid.cells; ++i) {
       plane[i] = cost[i] == kInfinite ? kUnreachable
                                       : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kUnreachable - 1));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/lattice.h"
@@ -56,8 +57,21 @@ class LineTable {
       return GridIndex(size, domain.Clamp(displacement) - domain.min);
     }
   };
-  void Fill(const ContactMap& map, int axis, int orientation, int spread, std::uint32_t free_units,
-            std::uint32_t contact_units);
+  /// Of one hypothesis' step, in units of the table.
+  struct StepUnits {
+    std::uint32_t free;
+    std::uint32_t contact;
+  };
+  struct LineBits;
+  void Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units);
+  static LineBits BitsOf(const ContactMap& map, const Grid& grid, int axis, int orientation);
+  /// The sum over the runs of a part of the line (`bits`) that is met at cell `at`.
+  static std::uint32_t RunsValue(const Grid& grid, const std::uint16_t* planes, std::int64_t along, std::uint32_t bits,
+                                 std::size_t at);
+  /// Lowers `cost` where one step splits a line of this length, and lists these places.
+  static void SplittingSteps(const Grid& grid, const LineBits& bits, int axis, int length, const StepUnits& units,
+                             const std::uint16_t* planes, std::vector<std::uint32_t>& cost,
+                             std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds);
 
   double unit_ = 1.0;
   std::vector<int> place_;  ///< of an orientation among those tabled; -1: none

@@ -14,6 +14,11 @@ namespace {
 constexpr std::uint32_t kInfinite = ~std::uint32_t{0};
 constexpr std::uint32_t kUnitsPerStep = 16;  ///< where contacts cost something
 
+/// The cell after `from` in a box, by its index.
+std::uint32_t NextIn(const OrientedBox& box, std::uint32_t from, Direction d) {
+  return static_cast<std::uint32_t>(from + SignOf(d) * box.strides()[static_cast<std::size_t>(AxisOf(d))]);
+}
+
 }  // namespace
 
 OrientedLines::OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
@@ -59,53 +64,79 @@ void OrientedLines::AddLines(Axis axis, const Problem& problem, const StepFlagsG
   }
 }
 
-void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units, Line& line) const {
+/// What a line meets at each cell of its box. Bit i: under hypothesis i of the line.
+struct OrientedLines::LineBits {
+  std::vector<std::uint8_t> inside;                                ///< the cell is out of reach
+  std::vector<std::array<std::uint8_t, kDirectionCount>> blocked;  ///< the step is
+  std::vector<std::uint8_t> leads;                                 ///< bit d: the step in direction d stays in the box
+  std::vector<std::uint32_t> telling;                              ///< cells where some step splits the line
+};
+
+OrientedLines::LineBits OrientedLines::BitsOf(const StepFlagsGrid& flags, const Line& line) {
   const OrientedBox& box = line.box;
-  const std::size_t cells = box.cells;
-  const auto strides = box.strides();
-  // Bit i: under hypothesis i of the line the cell is out of reach, or the step is blocked; and which steps stay
-  // inside.
-  std::vector<std::uint8_t> inside(cells, 0);
-  std::vector<std::array<std::uint8_t, kDirectionCount>> blocked(cells);
-  std::vector<std::uint8_t> leads(cells, 0);
-  std::vector<std::uint32_t> telling;  // cells where some step splits the line
+  LineBits bits;
+  bits.inside.assign(box.cells, 0);
+  bits.blocked.resize(box.cells);
+  bits.leads.assign(box.cells, 0);
+  const auto all = static_cast<std::uint8_t>((1U << line.orientations.size()) - 1);
   std::uint32_t cell = 0;
-  for (int z = 0; z < box.size.z(); ++z) {
-    for (int y = 0; y < box.size.y(); ++y) {
-      for (int x = 0; x < box.size.x(); ++x, ++cell) {
-        const Cell at(x, y, z);
-        for (std::size_t i = 0; i < line.orientations.size(); ++i) {
-          const std::uint8_t steps = flags.At(box.domain.min + at, line.orientations[i]);
-          const auto bit = static_cast<std::uint8_t>(1U << i);
-          if (steps == kOutOfReach) inside[cell] |= bit;
-          for (const Direction d : kDirections) {
-            if (steps == kOutOfReach || (steps >> IndexOf(d) & 1) != 0) {
-              blocked[cell][static_cast<std::size_t>(IndexOf(d))] |= bit;
-            }
-          }
-        }
-        const auto all = static_cast<std::uint8_t>((1U << line.orientations.size()) - 1);
-        if (std::ranges::any_of(blocked[cell], [&](std::uint8_t b) { return b != 0 && b != all; })) {
-          telling.push_back(cell);
-        }
-        for (const Direction d : kDirections) {
-          const int to = at[AxisOf(d)] + SignOf(d);
-          if (to >= 0 && to < box.size[AxisOf(d)]) leads[cell] |= static_cast<std::uint8_t>(1U << IndexOf(d));
+  ForEachCell({Cell::Zero(), box.size - Cell::Ones()}, [&](const Cell& at) {
+    for (std::size_t i = 0; i < line.orientations.size(); ++i) {
+      const std::uint8_t steps = flags.At(box.domain.min + at, line.orientations[i]);
+      const auto bit = static_cast<std::uint8_t>(1U << i);
+      if (steps == kOutOfReach) bits.inside[cell] |= bit;
+      for (const Direction d : kDirections) {
+        if (steps == kOutOfReach || (steps >> IndexOf(d) & 1) != 0) {
+          bits.blocked[cell][static_cast<std::size_t>(IndexOf(d))] |= bit;
         }
       }
     }
-  }
-  const auto step = [&](std::uint32_t from, Direction d) {
-    return static_cast<std::uint32_t>(from + SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
-  };
+    if (std::ranges::any_of(bits.blocked[cell], [&](std::uint8_t b) { return b != 0 && b != all; })) {
+      bits.telling.push_back(cell);
+    }
+    for (const Direction d : kDirections) {
+      const int to = at[AxisOf(d)] + SignOf(d);
+      if (to >= 0 && to < box.size[AxisOf(d)]) bits.leads[cell] |= static_cast<std::uint8_t>(1U << IndexOf(d));
+    }
+    ++cell;
+  });
+  return bits;
+}
 
-  const std::uint32_t subsets = 1U << line.orientations.size();
-  line.values.assign(cells * subsets, 0);
-  const auto value = [&](std::uint32_t subset, std::uint32_t at) -> std::uint32_t {
-    if (std::has_single_bit(subset)) return 0;
-    const std::uint16_t v = line.values[subset * cells + at];
+void OrientedLines::SplittingSteps(const Line& line, const LineBits& bits, std::uint32_t subset,
+                                   std::uint32_t contact_units, std::vector<std::uint32_t>& cost,
+                                   std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds) const {
+  const auto value = [&](std::uint32_t part, std::uint32_t at) -> std::uint32_t {
+    if (std::has_single_bit(part)) return 0;
+    const std::uint16_t v = line.values[part * line.box.cells + at];
     return v == kNone ? kInfinite : v;
   };
+  for (const std::uint32_t at : bits.telling) {
+    if ((bits.inside[at] & subset) != 0) continue;
+    for (const Direction d : kDirections) {
+      const std::uint32_t hit = bits.blocked[at][static_cast<std::size_t>(IndexOf(d))] & subset;
+      if (hit == 0 || hit == subset) continue;
+      const std::uint32_t missed = subset & ~hit;
+      const std::uint32_t after_hit = value(hit, at);
+      // Over the edge everything repeats.
+      const bool stays = (bits.leads[at] >> IndexOf(d) & 1) == 0;
+      const std::uint32_t after_miss = value(missed, stays ? at : NextIn(line.box, at, d));
+      if (after_hit == kInfinite || after_miss == kInfinite) continue;
+      const std::uint32_t of_split = after_hit + after_miss +
+                                     static_cast<std::uint32_t>(std::popcount(hit)) * contact_units +
+                                     static_cast<std::uint32_t>(std::popcount(missed)) * units_per_step_;
+      if (of_split >= cost[at]) continue;
+      cost[at] = of_split;
+      seeds.emplace_back(of_split, at);
+    }
+  }
+}
+
+void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units, Line& line) const {
+  const std::size_t cells = line.box.cells;
+  const LineBits bits = BitsOf(flags, line);
+  const std::uint32_t subsets = 1U << line.orientations.size();
+  line.values.assign(cells * subsets, 0);
   std::vector<std::uint32_t> order;
   for (std::uint32_t s = 1; s < subsets; ++s) {
     if (!std::has_single_bit(s)) order.push_back(s);
@@ -118,29 +149,12 @@ void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units
     const auto count = static_cast<std::uint32_t>(std::popcount(subset));
     std::ranges::fill(cost, kInfinite);
     seeds.clear();
-    for (const std::uint32_t at : telling) {
-      if ((inside[at] & subset) != 0) continue;
-      for (const Direction d : kDirections) {
-        const std::uint32_t hit = blocked[at][static_cast<std::size_t>(IndexOf(d))] & subset;
-        if (hit == 0 || hit == subset) continue;
-        const std::uint32_t missed = subset & ~hit;
-        const std::uint32_t after_hit = value(hit, at);
-        // Over the edge everything repeats.
-        const std::uint32_t after_miss = value(missed, (leads[at] >> IndexOf(d) & 1) != 0 ? step(at, d) : at);
-        if (after_hit == kInfinite || after_miss == kInfinite) continue;
-        const std::uint32_t of_split = after_hit + after_miss +
-                                       static_cast<std::uint32_t>(std::popcount(hit)) * contact_units +
-                                       static_cast<std::uint32_t>(std::popcount(missed)) * units_per_step_;
-        if (of_split >= cost[at]) continue;
-        cost[at] = of_split;
-        seeds.emplace_back(of_split, at);
-      }
-    }
+    SplittingSteps(line, bits, subset, contact_units, cost, seeds);
     SpreadByEqualSteps(seeds, count * units_per_step_, cost, queue, [&](std::uint32_t to, auto relax) {
       for (const Direction d : kDirections) {
-        if ((leads[to] >> IndexOf(Opposite(d)) & 1) == 0) continue;
-        const std::uint32_t before = step(to, Opposite(d));
-        if ((inside[before] | blocked[before][static_cast<std::size_t>(IndexOf(d))]) & subset) continue;
+        if ((bits.leads[to] >> IndexOf(Opposite(d)) & 1) == 0) continue;
+        const std::uint32_t before = NextIn(line.box, to, Opposite(d));
+        if ((bits.inside[before] | bits.blocked[before][static_cast<std::size_t>(IndexOf(d))]) & subset) continue;
         relax(before);
       }
     });

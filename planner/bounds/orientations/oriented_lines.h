@@ -49,7 +49,13 @@ class OrientedLines {
     std::vector<std::uint16_t> values;  ///< plane after plane, by subset
   };
   void AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags, const std::vector<char>& used);
+  struct LineBits;
+  static LineBits BitsOf(const StepFlagsGrid& flags, const Line& line);
   void Fill(const StepFlagsGrid& flags, std::uint32_t contact_units, Line& line) const;
+  /// Lowers `cost` where one step splits the subset of the line, and lists these places.
+  void SplittingSteps(const Line& line, const LineBits& bits, std::uint32_t subset, std::uint32_t contact_units,
+                      std::vector<std::uint32_t>& cost,
+                      std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds) const;
 
   std::uint32_t units_per_step_ = 1;
   std::array<std::vector<Place>, kAxes> places_;  ///< by orientation
