@@ -129,20 +129,31 @@ TEST_F(SimulatedRobotTest, ZeroWrenchRemovesTheBiasAndNoiseIsAsAsked) {
   EXPECT_EQ(robot_.sensor().exact().force_n.norm(), 0.0);
 }
 
+// A sensor with a delay of n steps reads what physics said n steps before.
 TEST_F(SimulatedRobotTest, DelayShiftsTheReading) {
-  NoiseOptions noise;
-  noise.force_delay_s = 0.01;
-  GuardedMotion motion;
-  motion.distance_m = 0.01;
-  Place({0.02, 0.02, 0.005});
-  const double prompt_s = (robot_.Guarded(motion), robot_.Time());
-  const double prompt_force_n = robot_.statistics().peak_force_n;
-  Place({0.02, 0.02, 0.005}, noise);
-  const MotionResult late = robot_.Guarded(motion);
-  EXPECT_TRUE(late.contact);
-  EXPECT_GE(robot_.statistics().peak_force_n, prompt_force_n);
-  EXPECT_GT(late.travelled_m, 0.005);
-  EXPECT_GT(robot_.Time(), prompt_s - 0.2);
+  for (const double delay_s : {0.0, 0.004, 0.01}) {
+    NoiseOptions noise;
+    noise.force_delay_s = delay_s;
+    Place({0.02, 0.02, 0.001}, noise);
+    Vector6 down = Vector6::Zero();
+    down.z() = -2e-4;
+    std::vector<Eigen::Vector3d> exact;
+    std::vector<Eigen::Vector3d> read;
+    for (int i = 0; i < 150; ++i) {
+      robot_.Servo(down, 1);
+      exact.push_back(robot_.sensor().exact().force_n);
+      read.push_back(robot_.sensor().raw().force_n);
+    }
+    EXPECT_GT(exact.back().norm(), 5.0) << "the board is felt";
+    const auto steps = static_cast<std::size_t>(std::lround(delay_s / scene_->model->opt.timestep));
+    EXPECT_EQ(steps > 0, delay_s > 0.0);
+    int changing = 0;
+    for (std::size_t i = steps; i < read.size(); ++i) {
+      EXPECT_EQ(read[i], exact[i - steps]) << "step " << i << ", delay " << delay_s;
+      changing += i > 0 && exact[i] != exact[i - 1];
+    }
+    EXPECT_GT(changing, 20) << "else no delay would show";
+  }
 }
 
 TEST_F(SimulatedRobotTest, BadArgumentsAreRefusedAndChangeNothing) {

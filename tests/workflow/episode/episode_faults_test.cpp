@@ -153,10 +153,26 @@ TEST_P(NoisyEpisode, IsMasteredAndDeterministic) {
   EXPECT_EQ(first.execution.sim_time_s, second.execution.sim_time_s);
   EXPECT_EQ(first.execution.path_length_m, second.execution.path_length_m);
   EXPECT_EQ(first.execution.ladder.size(), second.execution.ladder.size());
-  if (std::string(GetParam()) == "fall-in") {
+  const std::string fault = GetParam();
+  const auto felt = [](const EpisodeRecord& record) {
+    std::vector<double> travelled_m;
+    for (const auto& move : record.execution.moves) travelled_m.push_back(move.travelled_m);
+    return travelled_m;
+  };
+  // The fault has reached the world: another truth, or the same one that feels different.
+  const EpisodeRecord ideal = Runner(PlugSetup(), "ideal").Run(2);
+  const bool moved = first.world_T_true.matrix() != ideal.world_T_true.matrix();
+  EXPECT_EQ(moved, fault != "ideal" && fault != "friction" && fault != "oversize");
+  EXPECT_EQ(felt(first) == felt(ideal), fault == "ideal");
+  EXPECT_EQ(first.truth_outside, fault == "outside");
+  if (fault == "fall-in") {
     EXPECT_TRUE(first.execution.fell_in);
   }
-  if (std::string(GetParam()) == "yaw-3") {
+  if (fault.starts_with("yaw-")) {
+    const Eigen::AngleAxisd turn(ideal.world_T_true.linear().transpose() * first.world_T_true.linear());
+    EXPECT_NEAR(turn.angle(), (fault == "yaw-3" ? 3.0 : 2.0) * std::numbers::pi / 180.0, 1e-9);
+  }
+  if (fault == "yaw-3") {
     EXPECT_LT(first.error->angle_rad, 0.0175);
   }
 }

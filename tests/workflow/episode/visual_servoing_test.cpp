@@ -46,6 +46,30 @@ TEST(VisualServoing, InsertsByRedTapeAndRepeats) {
   EXPECT_EQ(again.execution.world_T_estimate->matrix(), first.execution.world_T_estimate->matrix());
 }
 
+// What is taught is the picture at the nominal target: the same pixels and the same place whoever taught before, at
+// whatever truth the scene's episodes stand.
+TEST(VisualServoing, TheGoalKnowsNothingOfTheTruth) {
+  const auto setup = std::make_shared<const PlanningSetup>(LoadPlanningSetup("plug-red-tape"));
+  const auto scene = BuildEpisodeScene(*setup);
+  const auto fresh = TeachVisualGoal(scene);
+  EpisodeRunner runner = Runner("plug-red-tape", "visual-servoing");
+  const EpisodeRecord elsewhere = runner.Run(1);
+  ASSERT_GT((elsewhere.world_T_true.translation() - setup->task().world_T_target.translation()).norm(), 1e-3);
+  const auto later = TeachVisualGoal(scene);
+  VisualGoalOnce once;
+  const auto shared = once.For(*setup);
+  for (const auto& goal : {later, shared}) {
+    EXPECT_EQ(goal->view.rgb, fresh->view.rgb);
+    EXPECT_EQ(goal->depth_m, fresh->depth_m);
+    EXPECT_EQ(goal->tool_T_target.matrix(), fresh->tool_T_target.matrix());
+  }
+  // A moved target gives another picture: the comparison can fail.
+  PlanningSetup moved = *setup;
+  moved.model.task.world_T_target.translation().x() += 0.01;
+  VisualGoalOnce other;
+  EXPECT_NE(other.For(moved)->depth_m, fresh->depth_m);
+}
+
 TEST(VisualServoing, FindsNothingOnABlackPort) {
   EpisodeRunner runner = Runner("plug-black", "visual-servoing");
   const EpisodeRecord record = runner.Run(0);

@@ -5,8 +5,6 @@
 // - users of the bare robot who ram the board, hammer on it, never move, command NaN: fail, and force, impulse and path
 //   say what they did;
 // - the same insertion with more force than is allowed, or after the time limit, is none.
-#include "feeler/evaluation/records/scoring.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,6 +15,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/env/gym/insertion_env.h"
 #include "feeler/evaluation/records/episode_json.h"
 #include "feeler/workflow/episode/episode.h"
 
@@ -125,12 +124,20 @@ TEST(Adversaries, WhoLeavesAllToTheConfirmingTouchesIsScoredByWhereTheToolIs) {
   const workflow::EpisodeRecord record = RunOnce([](int) { return policies::Insert{}; });
   EXPECT_EQ(record.inserted, record.depth_m > 0.9 * DepthAsked()) << record.reason;
   EXPECT_EQ(record.reason == "inserted", record.inserted);
-  if (record.localized) {
-    ASSERT_TRUE(record.execution.world_T_estimate.has_value());
-    EXPECT_LT((record.execution.world_T_estimate->translation() - record.world_T_true.translation()).head<2>().norm(),
-              0.002);
-  }
+  EXPECT_TRUE(record.localized) << "by the touches of the executor";
+  ASSERT_TRUE(record.execution.world_T_estimate.has_value());
+  EXPECT_LT((record.execution.world_T_estimate->translation() - record.world_T_true.translation()).head<2>().norm(),
+            0.002);
 }
+
+/// What the world says of the present instant; nothing rests on what a policy or a user of the robot claims.
+struct Score {
+  explicit Score(const env::InsertionEnv& environment)
+      : verdict(environment.Judge()), did(environment.robot().statistics()) {}
+  bool success() const { return verdict.inserted; }
+  env::InsertionVerdict verdict;
+  env::RobotStatistics did;
+};
 
 struct User {
   User() : environment(workflow::BuildEpisodeScene(*Setup())) {
@@ -157,26 +164,27 @@ struct User {
 
 TEST(Adversaries, UsersOfTheRobotScoreWhatTheyDid) {
   User idle;
-  const EpisodeScore nothing = ScoreOf(idle.environment);
-  EXPECT_FALSE(nothing.success);
-  EXPECT_EQ(nothing.path_length_m, 0.0);
-  EXPECT_EQ(nothing.partial_depth, 0.0);
-  EXPECT_EQ(nothing.peak_force_n, 0.0);
+  const Score nothing(idle.environment);
+  EXPECT_FALSE(nothing.success());
+  EXPECT_EQ(nothing.did.path_length_m, 0.0);
+  EXPECT_LE(nothing.verdict.depth_m, 0.0);
+  EXPECT_EQ(nothing.did.peak_force_n, 0.0);
 
   // Commands that are no numbers change nothing.
   GuardedMotion nonsense;
   nonsense.distance_m = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(idle.environment.robot().Guarded(nonsense), InputError);
-  EXPECT_EQ(ScoreOf(idle.environment).path_length_m, 0.0);
+  EXPECT_EQ(Score(idle.environment).did.path_length_m, 0.0);
 
   User rammer;
   rammer.environment.robot().LinearMove(rammer.At(0.01, 0.002), 0.1, 1e6);
   rammer.Press(rammer.At(0.01, -0.05), 150.0);
-  const EpisodeScore rammed = ScoreOf(rammer.environment);
-  EXPECT_FALSE(rammed.success);
-  EXPECT_EQ(rammed.partial_depth, 0.0) << "beside the port, no depth counts";
-  EXPECT_GT(rammed.peak_force_n, 30.0);
-  EXPECT_GT(rammed.impulse_ns, 0.0);
+  const Score rammed(rammer.environment);
+  EXPECT_FALSE(rammed.success());
+  EXPECT_FALSE(rammer.environment.limits().InsideOpening(rammer.environment.task(), Eigen::Vector3d(0.01, 0.0, 0.0)))
+      << "beside the port, no depth counts";
+  EXPECT_GT(rammed.did.peak_force_n, 30.0);
+  EXPECT_GT(rammed.did.impulse_ns, 0.0);
 
   User hammerer;
   hammerer.environment.robot().LinearMove(hammerer.At(0.01, 0.002), 0.1, 1e6);
@@ -184,10 +192,10 @@ TEST(Adversaries, UsersOfTheRobotScoreWhatTheyDid) {
   for (int blow = 0; blow < 3; ++blow) {
     hammerer.Press(hammerer.At(0.01, -0.02), 60.0);
     hammerer.environment.robot().LinearMove(hammerer.At(0.01, 0.004), 0.1, 1e6);
-    const EpisodeScore hammered = ScoreOf(hammerer.environment);
-    EXPECT_FALSE(hammered.success);
-    EXPECT_GT(hammered.impulse_ns, impulse_ns) << "every blow counts";
-    impulse_ns = hammered.impulse_ns;
+    const Score hammered(hammerer.environment);
+    EXPECT_FALSE(hammered.success());
+    EXPECT_GT(hammered.did.impulse_ns, impulse_ns) << "every blow counts";
+    impulse_ns = hammered.did.impulse_ns;
   }
 
   // Half way into the port, then all the way.
@@ -195,15 +203,15 @@ TEST(Adversaries, UsersOfTheRobotScoreWhatTheyDid) {
   const double depth_m = honest.environment.task().insertion_depth_m;
   honest.environment.robot().LinearMove(honest.At(0.0, 0.002), 0.1, 1e6);
   honest.Press(honest.At(0.0, -0.5 * depth_m), 60.0);
-  const EpisodeScore half = ScoreOf(honest.environment);
-  EXPECT_FALSE(half.success);
-  EXPECT_NEAR(half.partial_depth, 0.5, 0.1);
-  EXPECT_EQ(half.reason, "too shallow");
+  const Score half(honest.environment);
+  EXPECT_FALSE(half.success());
+  EXPECT_NEAR(half.verdict.depth_m, 0.5 * depth_m, 0.1 * depth_m);
+  EXPECT_EQ(half.verdict.reason, env::InsertionReason::kTooShallow);
   honest.Press(honest.At(0.0, -depth_m - 0.001), 60.0);
-  const EpisodeScore whole = ScoreOf(honest.environment);
-  EXPECT_TRUE(whole.success) << whole.reason;
-  EXPECT_GT(whole.partial_depth, 0.9);
-  EXPECT_EQ(whole.forbidden_contacts, 0);
+  const Score whole(honest.environment);
+  EXPECT_TRUE(whole.success()) << env::ToString(whole.verdict.reason);
+  EXPECT_GT(whole.verdict.depth_m, 0.9 * depth_m);
+  EXPECT_EQ(whole.did.forbidden_contacts, 0);
 
   // The hammer's blows are not forgiven: its force limit is the episode's, not the last motion's.
   const env::InsertionLimits limits = honest.environment.limits();
@@ -217,18 +225,6 @@ TEST(Adversaries, UsersOfTheRobotScoreWhatTheyDid) {
   Pose elsewhere = port;
   elsewhere.translation().x() += 0.01;
   EXPECT_FALSE(env::JudgeInsertion(task, limits, inserted, elsewhere, 1.0, 1.0).inserted) << "not the right port";
-}
-
-TEST(PartialDepthTest, NeedsTheOpening) {
-  Task task;
-  task.insertion_depth_m = 0.02;
-  const env::InsertionLimits limits = env::LimitsOf(task);
-  EXPECT_DOUBLE_EQ(PartialDepth(task, limits, 0.005, 0.0), 0.25);
-  EXPECT_EQ(PartialDepth(task, limits, 0.5, 0.0), 1.0);
-  EXPECT_EQ(PartialDepth(task, limits, -0.5, 0.0), 0.0);
-  EXPECT_EQ(PartialDepth(task, limits, 0.02, 0.01), 0.0);
-  EXPECT_EQ(PartialDepth(task, limits, std::nan(""), 0.0), 0.0);
-  EXPECT_EQ(PartialDepth(task, limits, 0.02, std::nan("")), 0.0);
 }
 
 }  // namespace
