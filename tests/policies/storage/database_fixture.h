@@ -28,8 +28,13 @@ inline StoredProblem RandomProblem(const planner::Extents& extents, std::uint64_
   StoredProblem problem;
   problem.extents = extents;
   problem.status = "converged";
-  problem.solver = "rtdp-bel";
-  problem.epsilon = 1.2;
+  if (random.Index(3) == 0) {
+    problem.solver = "certified";
+    problem.gap = 1.15;
+  } else {
+    problem.solver = "rtdp-bel";
+    problem.epsilon = 1.2;
+  }
   problem.policy = RandomPolicy(random, 20 + random.Index(100), random.Index(3) != 0);
   problem.expected_cost = problem.policy->expected_cost;
   problem.lower_bound = problem.policy->lower_bound;
@@ -58,7 +63,7 @@ inline std::vector<StoredProblem> RandomProblems(int count, std::uint64_t seed) 
 }
 
 inline bool Same(const StoredProblem& a, const StoredProblem& b) {
-  return a.extents == b.extents && a.status == b.status && a.solver == b.solver && SameBits(a.epsilon, b.epsilon) &&
+  return a.extents == b.extents && a.status == b.status && a.solver == b.solver && SameBits(a.Promise(), b.Promise()) &&
          SameBits(a.expected_cost, b.expected_cost) && SameBits(a.lower_bound, b.lower_bound) &&
          a.expansions == b.expansions && a.seed == b.seed && a.version == b.version && a.cpu_s == b.cpu_s &&
          a.wall_s == b.wall_s && a.policy.has_value() == b.policy.has_value() &&

@@ -21,6 +21,8 @@
 #include <thread>
 
 #include "feeler/core/error.h"
+#include "feeler/policies/storage/file_checks.h"
+#include "feeler/policies/storage/schema.h"
 #include "tests/policies/storage/database_fixture.h"
 
 namespace feeler::policies {
@@ -322,6 +324,39 @@ TEST_F(DatabaseTest, NamesForeignAndUnknownVersions) {
   EXPECT_THAT(reading(), HasSubstr("damaged"));
   execute("DROP TRIGGER t; PRAGMA journal_mode=WAL");
   Database::OpenReadOnly(path()).Verify();
+}
+
+// A file of an older version holds the same problems: it is read, continued in its own form, and verified.
+TEST_F(DatabaseTest, OlderVersionsAreReadAndContinued) {
+  for (const int version : {1, 2}) {
+    SCOPED_TRACE(version);
+    std::filesystem::remove(path());
+    { Database::Create(path(), Identity()); }
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open(path().c_str(), &handle), SQLITE_OK);
+    std::string sql;
+    for (const TableSchema& table : SchemaOf(version)) {
+      if (std::string(table.name) == "problems") sql += "DROP TABLE problems; " + std::string(table.sql) + ";";
+    }
+    sql += "PRAGMA user_version=" + std::to_string(version);
+    EXPECT_EQ(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
+    sqlite3_close(handle);
+    std::vector<StoredProblem> problems = RandomProblems(30, 8);
+    problems.push_back(RandomProblem(Extents{9, 9, 9, 1, 1}, 9));
+    if (version == 2) problems.push_back(RandomProblem(Extents{2, 3, 1, 4, 5}, 9));
+    for (const std::size_t first : {std::size_t{0}, problems.size() / 2}) {
+      Database database = Database::OpenOrCreate(path(), Identity());
+      const std::size_t end = first == 0 ? problems.size() / 2 : problems.size();
+      for (std::size_t i = first; i < end; ++i) database.Put(problems[i]);
+    }
+    Database database = Database::OpenReadOnly(path());
+    database.Verify();
+    for (const StoredProblem& problem : problems) ExpectSame(database.Get(problem.extents), problem);
+    if (version == 1) {
+      EXPECT_THROW(Database::OpenOrCreate(path(), Identity()).Put(RandomProblem(Extents{2, 3, 1, 4, 5}, 9)),
+                   std::invalid_argument);
+    }
+  }
 }
 
 TEST_F(DatabaseTest, OpensAndGetsWithinAMillisecond) {
