@@ -71,6 +71,13 @@ function(feeler_install_package)
   install(FILES ${FEELER_INCLUDE_DIR}/feeler/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/feeler)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/models DESTINATION ${FEELER_DATA_INSTALL_DIR})
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/evaluation/report/page DESTINATION ${FEELER_DATA_INSTALL_DIR}/evaluation/report)
+  foreach(script /usr/share/javascript/three/three.min.js /usr/share/javascript/three/examples/js/controls/OrbitControls.js
+                 /usr/share/nodejs/d3/dist/d3.min.js)
+    if(EXISTS ${script})  # so that a moved prefix makes reports (MIT and BSD-3-Clause: see NOTICE)
+      get_filename_component(script ${script} REALPATH)
+      install(FILES ${script} DESTINATION ${FEELER_DATA_INSTALL_DIR}/evaluation/report/libraries)
+    endif()
+  endforeach()
   install(FILES ${PROJECT_SOURCE_DIR}/evaluation/paper_results.json DESTINATION ${FEELER_DATA_INSTALL_DIR}/evaluation)
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/NOTICE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
           DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <set>
@@ -35,8 +36,14 @@ std::string PageFile(const std::string& name) {
   return ReadText(FindData("evaluation/report/page").string() + "/" + name, "install feeler again");
 }
 
+/// The copy that is installed with feeler, where there is one, else the system's.
 std::string Library(const std::string& path) {
-  return ReadText(path, "the page needs libjs-three and node-d3: ./run setup installs them");
+  std::string chosen = path;
+  try {
+    chosen = FindData("evaluation/report/libraries/" + std::filesystem::path(path).filename().string()).string();
+  } catch (const InputError&) {  // in the source tree there is none
+  }
+  return ReadText(chosen, "the page needs libjs-three and node-d3: ./run setup installs them");
 }
 
 /// JSON that may stand inside a script element.

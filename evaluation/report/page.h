@@ -8,7 +8,8 @@
 
 namespace feeler::evaluation {
 
-/// The JavaScript that the page carries: Debian's packages libjs-three and node-d3.
+/// The JavaScript that the page carries, as Debian's packages libjs-three and node-d3 have it. An installed feeler has
+/// copies of the three in its share/feeler and takes those.
 struct ReportLibraries {
   std::string three = "/usr/share/javascript/three/three.min.js";
   std::string orbit_controls = "/usr/share/javascript/three/examples/js/controls/OrbitControls.js";
