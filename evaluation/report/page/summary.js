@@ -106,7 +106,7 @@ const Summary = {
     const parts = [];
     if (data.experiments.length) parts.push(`${data.experiments.length} experiment${data.experiments.length > 1 ? "s" : ""}`);
     if (episodes) parts.push(`${episodes.toLocaleString("en-US")} episodes${failed ? `, ${failed.toLocaleString("en-US")} of them failed` : ", none failed"}`);
-    section.append(element("h1", {}, "Insertion by touch"), element("p", { class: "lead" }, `${parts.join(" and ")} in ${data.folder}. `,
+    section.append(element("h1", {}, "Insertion by touch"), element("p", { class: "lead" }, `${parts.join(" and ")}. Folder: ${data.folder}. `,
       data.faults.length ? element("a", { href: "#faults" }, `${data.faults.length} fault${data.faults.length > 1 ? "s" : ""} in the folder.`) : null));
     if (cards.length) section.append(element("div", { class: "cards" }, cards));
     const policies = groups.filter((g) => g.episodes.length).map((g) => ({ label: `${g.task} · ${g.policy}${g.noise === "ideal" ? "" : " · " + g.noise}`, rate: Summary.rate(g.episodes) }));
