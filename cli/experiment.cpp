@@ -25,6 +25,7 @@ struct Flags {
   bool list = false;
   bool quick = false;
   std::string task;
+  std::string pomdps;
   std::uint64_t seed = 1;
   int solver_seeds = 0;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -63,9 +64,11 @@ void Run(const Flags& flags, Session& session) {
   request.jobs = Parallelism(flags.jobs);
   request.seed = flags.seed;
   request.task = flags.task;
+  request.pomdps = flags.pomdps;
   request.solver_seeds = flags.solver_seeds;
-  request.command = fmt::format("feeler experiment {} --out {}{}{}{} --seed {} --jobs {}", flags.name, flags.out,
+  request.command = fmt::format("feeler experiment {} --out {}{}{}{}{} --seed {} --jobs {}", flags.name, flags.out,
                                 flags.quick ? " --quick" : "", flags.task.empty() ? "" : " --task " + flags.task,
+                                flags.pomdps.empty() ? "" : " --pomdps " + flags.pomdps,
                                 flags.solver_seeds > 0 ? fmt::format(" --solver-seeds {}", flags.solver_seeds) : "",
                                 flags.seed, request.jobs.threads());
   request.cancellation = session.cancellation;
@@ -99,6 +102,8 @@ void AddExperimentCommand(CLI::App& app, Session& session) {
   command->add_option("--task", flags->task,
                       "name under models/tasks/, or path of a task file, for the experiments on planning (default: "
                       "plug)");
+  command->add_option("--pomdps", flags->pomdps,
+                      "folder of .pomdp and .pomdpx files that pomdp-benchmarks solves, too");
   AddInteger(*command, "--solver-seeds", flags->solver_seeds, 1, 1000,
              "repetitions of each attempt of a table (default: 3; 1 with --quick); more may be added to a "
              "finished folder",

@@ -17,6 +17,7 @@
 #include "feeler/evaluation/studies/bounds.h"
 #include "feeler/evaluation/studies/noise.h"
 #include "feeler/evaluation/studies/perception.h"
+#include "feeler/evaluation/studies/pomdp_benchmarks.h"
 #include "feeler/evaluation/studies/spiral_tuning.h"
 
 namespace feeler::evaluation {
@@ -43,6 +44,8 @@ const std::vector<Experiment>& Experiments() {
       {kNoiseName, "sensor noise, joint friction and stiffness, a turned target: what breaks first", RunNoise},
       {kPerceptionName, "registration and uncertainty table over the workspace: errors, coverage, hypotheses",
        RunPerception},
+      {kPomdpBenchmarksName, "general POMDPs: proven intervals over time beside SARSOP's, and RTDP-Bel",
+       RunPomdpBenchmarks, false, false, true},
       {kSpiralTuningName, "pitch, speed and force of the spiral search, per socket", RunSpiralTuning},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
        true},
@@ -74,6 +77,9 @@ const Experiment& FindExperiment(const std::string& name) {
 ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRequest& request) {
   if (!request.task.empty() && !experiment.takes_task) {
     throw InputError("--task", "experiment " + experiment.name + " has its own", "leave it out");
+  }
+  if (!request.pomdps.empty() && !experiment.takes_pomdps) {
+    throw InputError("--pomdps", "not used by " + experiment.name, "leave it out");
   }
   if (request.solver_seeds < 0 || (request.solver_seeds > 0 && !experiment.takes_solver_seeds)) {
     throw InputError("--solver-seeds", request.solver_seeds < 0 ? "negative" : "not used by " + experiment.name,

@@ -18,6 +18,7 @@ struct ExperimentRequest {
   bool quick = false;  ///< few problems and short limits
   Parallelism jobs;
   std::string task;                                 ///< instead of the experiment's own, where it takes one
+  std::string pomdps;                               ///< folder of further models, where it takes them
   std::uint64_t seed = 1;                           ///< of samples; solver seeds count up from it
   int solver_seeds = 0;                             ///< repetitions, where the experiment takes them; 0: its own number
   std::string command;                              ///< for the manifest
@@ -45,6 +46,7 @@ struct Experiment {
   std::function<ExperimentResult(const ExperimentRequest&)> run;
   bool takes_task = false;          ///< follows ExperimentRequest::task
   bool takes_solver_seeds = false;  ///< follows ExperimentRequest::solver_seeds
+  bool takes_pomdps = false;        ///< follows ExperimentRequest::pomdps
 };
 
 /// Where the finished cells of an experiment are kept: OUT/NAME.partial.jsonl.
