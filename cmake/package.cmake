@@ -11,6 +11,6 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "libgl1-mesa-dri")
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "ffmpeg")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS
-    "cmake, g++, libmujoco-dev, libeigen3-dev, libompl-dev, liburdfdom-dev, libtinyxml2-dev, libsqlite3-dev, zlib1g-dev, nlohmann-json3-dev, libspdlog-dev, libfmt-dev, libtbb-dev, libopencv-core-dev, libopencv-imgproc-dev, libopencv-features2d-dev, libopencv-imgcodecs-dev, libnanoflann-dev, libegl-dev, libassimp-dev, libocct-foundation-dev, libocct-modeling-data-dev, libocct-modeling-algorithms-dev, libocct-data-exchange-dev")
+    "cmake, g++, libmujoco-dev, libeigen3-dev, libompl-dev, liburdfdom-dev, libtinyxml2-dev, libsqlite3-dev, zlib1g-dev, nlohmann-json3-dev, libspdlog-dev, libfmt-dev, libtbb-dev, libopencv-core-dev, libopencv-imgproc-dev, libopencv-features2d-dev, libopencv-imgcodecs-dev, libnanoflann-dev, libegl-dev, libassimp-dev, libqhull-dev, libocct-foundation-dev, libocct-modeling-data-dev, libocct-modeling-algorithms-dev, libocct-data-exchange-dev")
 set(CPACK_STRIP_FILES ON)
 include(CPack)

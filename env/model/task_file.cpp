@@ -142,6 +142,14 @@ bool TurnsFreely(const TaskModel& task_model) {
   return true;
 }
 
+/// The stem of the file, or the model's own name where the file is one `task.xml` among many, as imports write them.
+std::string NameOf(const mjModel& model, const std::string& stem) {
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.+";
+  const std::string_view own = model.names;  // the model's name stands first
+  const bool plain = !own.empty() && own.front() != '.' && own.find_first_not_of(kPlain) == std::string_view::npos;
+  return stem == "task" && plain ? std::string(own) : stem;
+}
+
 }  // namespace
 
 std::string_view ToString(Opening opening) { return opening == Opening::kClosed ? "closed" : "open"; }
@@ -172,7 +180,7 @@ TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, con
   SortGeoms(task_model, name);
   task_model.task = ReadTaskFields(model, name);
   task_model.task.world_T_target = BodyAtRest(model, task_model.target_body);
-  task_model.task.name = fs::path(name).stem().string();
+  task_model.task.name = NameOf(model, fs::path(name).stem().string());
   CheckGeometry(task_model, name);
   task_model.task.turns_freely = TurnsFreely(task_model);
   return task_model;

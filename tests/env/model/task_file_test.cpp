@@ -280,6 +280,20 @@ TEST_F(TaskFolder, ModelsFolderCanBeElsewhere) {
   EXPECT_EQ(peg.task.name, "peg");
 }
 
+TEST_F(TaskFolder, FilesNamedTaskAreCalledAsTheirModel) {
+  const auto name_of = [&](const std::string& file, const std::string& model) {
+    std::string text = TaskText().Mjcf();
+    const std::size_t at = text.find("<mujoco");
+    const std::size_t end = text.find('>', at);
+    text.replace(at, end - at + 1, "<mujoco" + (model.empty() ? "" : " model=\"" + model + "\"") + ">");
+    return LoadTask(Write(file, text)).task.name;
+  };
+  EXPECT_EQ(name_of("rect/task.xml", "rect-8.tight"), "rect-8.tight");
+  EXPECT_EQ(name_of("rect/other.xml", "rect-8.tight"), "other");
+  EXPECT_EQ(name_of("rect/task.xml", ""), "task");
+  for (const char* odd : {"../up", "a b", "MuJoCo Model", ".hidden"}) EXPECT_EQ(name_of("rect/task.xml", odd), "task");
+}
+
 TEST_F(TaskFolder, IncludesAreRelativeToTheMainFile) {
   TaskText text;
   Write("parts/peg.xml", "<mujoco>" + text.tool + "</mujoco>");
