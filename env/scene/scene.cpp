@@ -10,6 +10,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/arm/urdf_to_mjcf.h"
+#include "feeler/env/scene/contact_capacity.h"
 #include "feeler/env/scene/gripper.h"
 #include "feeler/env/scene/physics_model.h"
 #include "feeler/env/scene/scene_decor.h"
@@ -110,7 +111,7 @@ void AddSettings(const SceneOptions& options, XMLElement& mujoco) {
   size.SetAttribute("nconmax", options.max_contacts);
   // In numbers of 8 bytes. MuJoCo's own guess is 5 njmax^2, for solvers that invert the constraint space; Newton with
   // six joints used 1500 at 50 contacts.
-  size.SetAttribute("nstack", 32768);
+  size.SetAttribute("nstack", std::max(32768, 20 * options.max_constraints));
 
   // Contact parameters are defaults, so that a geom of the task file may have its own.
   XMLElement* defaults = mujoco.FirstChildElement("default");
@@ -286,7 +287,14 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
 
 Scene BuildScene(const TaskModel& task, const SceneOptions& options) {
   const GripperFit gripper = FitGripper(*task.model, task.tool_geoms, task.tool_body, task.task.flange_T_tool);
-  return Assemble(task.task, task.xml, ModelsFolder().string(), gripper, options);
+  SceneOptions sized = options;
+  const SceneOptions least;
+  if (options.max_constraints == least.max_constraints && options.max_contacts == least.max_contacts) {
+    const ContactCapacity capacity = CapacityFor(task);
+    sized.max_constraints = capacity.rows;
+    sized.max_contacts = capacity.contacts;
+  }
+  return Assemble(task.task, task.xml, ModelsFolder().string(), gripper, sized);
 }
 
 Scene BuildScene(const Task& task, const std::string& task_xml, const std::string& models_folder,

@@ -30,8 +30,8 @@ struct SceneOptions {
   double armature_kg_m2 = 0.1;
   double contact_friction = 0.3;  ///< sliding friction where the task file gives none
   bool workbench = true;          ///< a bench under robot and fixtures and a floor, unless the task file has its own
-  int max_constraints = 200;      ///< njmax; mjData grows with its square (0.9 MB at 200)
-  int max_contacts = 100;         ///< nconmax
+  int max_constraints = 200;      ///< njmax; at this value more where the parts need it
+  int max_contacts = 100;         ///< nconmax; the same
   SceneCameras cameras;           ///< seen and seeing, never felt
 };
 
