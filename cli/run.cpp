@@ -1,6 +1,7 @@
 // feeler run: seeded episodes in simulation.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -54,6 +55,7 @@ struct Flags {
   std::int64_t video_episode = 0;
   int jobs = 1;
   double confirm_limit_m = 0.0;  ///< 0: not given
+  double force_budget_n = 0.0;   ///< 0: not given
   bool no_ladder = false;
   bool withhold_true_pose = false;
   bool json = false;
@@ -168,6 +170,12 @@ void Run(const Flags& flags, Session& session) {
   if (!flags.perception.empty()) options.perception = PerceptionFor(flags.table, *setup);
   options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
   if (flags.confirm_limit_m > 0.0) options.confirm_limit_m = flags.confirm_limit_m;
+  if (flags.force_budget_n > 0.0) options.force_budget_n = flags.force_budget_n;
+  const double force_budget_n =
+      workflow::ForceBudget(setup->task(), workflow::ParseFaults(flags.noise), options.force_budget_n);
+  if (!options.force_budget_n && force_budget_n > setup->task().force_budget_n) {
+    fmt::print(stderr, "force budget: {:g} N, as the noise of the force sensor asks for\n", force_budget_n);
+  }
   options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
@@ -224,6 +232,9 @@ void Run(const Flags& flags, Session& session) {
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["solved_online"] = solved_online;
+    json["force_budget_n"] = force_budget_n;
+    json["force_budget_passed"] =
+        std::ranges::count_if(rows, [&](const auto& row) { return row.peak_force_n > force_budget_n; });
     json["noise"] = flags.noise;
     json["placement"] = workflow::ToString(options.perception ? workflow::Placement::kWorkspace : placement);
     json["perception"] = flags.perception.empty() ? nlohmann::json() : nlohmann::json(flags.perception);
@@ -266,6 +277,11 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
   AddReal(*command, "--confirm-limit", flags->confirm_limit_m, 1e-6, 1.0,
           "touch until the position across the insertion is known this well, m, default: 0.0005", false);
+  AddReal(
+      *command, "--force-budget", flags->force_budget_n, 1e-3, 1e6,
+      "no contact is to push harder, N: the tool comes as fast as that allows, default: the task's (25), more where "
+      "the noise of the force sensor asks for it",
+      false);
   command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
                     "leave the true pose out of what the environment tells; the records stay the same");
   AddJobs(*command, flags->jobs, "threads; the records do not depend on it");

@@ -63,9 +63,23 @@ struct MotionResult {
   StopReason reason = StopReason::kReached;
   double travelled_m = 0.0;  ///< along the commanded direction or path, measured
   bool contact = false;
+  /// Greatest net force of contact on the tool, N: without the noise of the sensor where the robot can tell (a
+  /// simulation), else as measured.
   double peak_force_n = 0.0;
   Pose world_T_tool = Pose::Identity();  ///< measured pose when the motion ended (for a contact: at the contact)
   std::string detail;                    ///< for people; empty when all went well
+};
+
+/// What a contact of the tool is like as the robot stands, along one direction: what the robot declares of itself, and
+/// what says how fast the tool may come (execution/contact/force_budget.h). The defaults are for robots that do not
+/// know: a heavy arm with hard parts.
+struct ContactResponse {
+  double held_mass_kg = 25.0;      ///< what an obstacle has to stop where the tool cannot turn (met face to face)
+  double free_mass_kg = 25.0;      ///< where it can (met at the tip); not above held_mass_kg
+  double stiffness_n_m = 6e4;      ///< of the parts in contact, force per indentation, for held_mass_kg
+  double damping_ratio = 1.0;      ///< of that contact; 0: elastic
+  double reaction_time_s = 0.004;  ///< from a force that counts as a contact until the tool is being stopped
+  double force_noise_n = 0.0;      ///< standard deviation of a force reading
 };
 
 /// The robot as the executor sees it: implemented by the simulation, or by a driver of a real arm. All poses are of the
@@ -88,6 +102,9 @@ class Robot {
   virtual MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) = 0;
   virtual MotionResult Guarded(const GuardedMotion& motion) = 0;
   virtual MotionResult Compliant(const CompliantMotion& motion) = 0;
+
+  /// As the tool stands, for a contact met along `direction` (unit vector, world axes).
+  virtual ContactResponse Contact(const Eigen::Vector3d& direction) const;
 
   // Robots with an eye on the wrist. Without one: an empty view, and no motion (kUnplanned).
   virtual CameraView Look();

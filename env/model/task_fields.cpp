@@ -17,11 +17,11 @@ namespace feeler::env {
 namespace {
 
 constexpr std::array kNumericFields = {
-    "feeler_resolution",        "feeler_min_cells",          "feeler_max_cells",       "feeler_start_offset",
-    "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth", "feeler_cell",
-    "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle", "feeler_cost",
-    "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",  "feeler_probe_speed",
-    "feeler_time_per_move",     "feeler_time_per_contact",   "feeler_workspace_center"};
+    "feeler_resolution",        "feeler_min_cells",          "feeler_max_cells",        "feeler_start_offset",
+    "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth",  "feeler_cell",
+    "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle",  "feeler_cost",
+    "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",   "feeler_probe_speed",
+    "feeler_force_budget",      "feeler_time_per_move",      "feeler_time_per_contact", "feeler_workspace_center"};
 constexpr std::array kTextFields = {"feeler_axes", "feeler_insertion_axis", "feeler_goal"};
 
 constexpr int kMaxCells = 64;       ///< hypotheses along an axis; beyond it a number is a slip, not a wish
@@ -253,7 +253,8 @@ void ReadVerdict(const Fields& fields, Task& task) {
     if (fields.HasNumeric(field)) value = fields.Number(field, "one number", low, high);
   };
   optional("feeler_transfer_speed", 1e-4, 10.0, task.times.transfer_speed_m_s);
-  optional("feeler_probe_speed", 1e-4, 10.0, task.times.probe_speed_m_s);
+  optional("feeler_probe_speed", "feeler_force_budget", 1e-4, 10.0, task.times.probe_speed_m_s);
+  optional("feeler_force_budget", 1e-3, 1e6, task.force_budget_n);
   optional("feeler_time_per_move", 0.0, 100.0, task.times.time_per_move_s);
   optional("feeler_time_per_contact", 0.0, 100.0, task.times.time_per_contact_s);
 

@@ -151,7 +151,7 @@ void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
                          sensor_.PairFlag(ContactPair::kRobotEnvironment) || sensor_.PairFlag(ContactPair::kRobotRobot);
   if (forbidden && !statistics_.forbidden_now) ++statistics_.forbidden_contacts;
   statistics_.forbidden_now = forbidden;
-  peak_force_n_ = std::max(peak_force_n_, sensor_.raw().force_n.norm());
+  peak_force_n_ = std::max(peak_force_n_, sensor_.exact().force_n.norm());
   tool_at_sensing_ = before;
   if (observer_ && world_.time_s() >= next_observation_s_ - 1e-9) {
     observer_(world_);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feeler/execution/contact/force_budget.h"
+
 namespace feeler::execution {
 namespace {
 
@@ -80,6 +82,7 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   move.duration_s = now_s - last_motion_end_s_;
   last_motion_end_s_ = now_s;
   record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
+  if (move.peak_force_n > options_.force_budget_n) ++record_.budget_passings;
   record_.path_length_m += (report.end - before).norm() * frame_.cell_m;
   record_.moves.push_back(std::move(move));
 
@@ -111,7 +114,8 @@ MotionReport Mover::Probe(Direction direction, double coordinate, const std::str
   GuardedMotion motion;
   motion.direction = frame_.DirectionInWorld(direction);
   motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
-  motion.speed_m_s = options_.probe_speed_m_s;
+  motion.speed_m_s =
+      std::min(options_.probe_speed_m_s, SpeedWithinBudget(robot_.Contact(motion.direction), options_.force_budget_n));
   motion.contact_force_n = options_.contact_force_n;
   const MotionReport report = Finish(robot_.Guarded(motion), target, kind, predicted, true);
   if (report.contact) ++record_.contacts;

@@ -1,5 +1,8 @@
 #include "feeler/workflow/episode/episode.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -30,6 +33,19 @@ class Watched {
 
 }  // namespace
 
+double ForceBudget(const Task& task, const EpisodeFaults& faults, const std::optional<double>& wanted_n) {
+  constexpr double kAboveThreshold = 1.2;
+  const double least_n = kAboveThreshold * faults.robot.contact_threshold_n;
+  if (!wanted_n) return std::max(task.force_budget_n, least_n);
+  if (!std::isfinite(*wanted_n) || *wanted_n < least_n) {
+    throw InputError("force budget",
+                     fmt::format("{} N, and with noise '{}' a contact is told from {:g} N on", *wanted_n, faults.name,
+                                 faults.robot.contact_threshold_n),
+                     fmt::format("give {:g} N or more", least_n));
+  }
+  return *wanted_n;
+}
+
 std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
   return std::make_shared<const env::Scene>(env::BuildScene(setup.model));
 }
@@ -39,7 +55,8 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
     : setup_(std::move(setup)),
       policy_factory_(std::move(policy_factory)),
       options_(std::move(options)),
-      noise_(ParseFaults(options_.noise)) {
+      noise_(ParseFaults(options_.noise)),
+      force_budget_n_(ForceBudget(setup_->task(), noise_, options_.force_budget_n)) {
   if (noise_.oversize_m > 0.0) {
     scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
   }
@@ -135,6 +152,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options = execution::ExecutorOptions::WithFriction();
       options.contact_force_n = reset.noise.contact_threshold_n;
     }
+    if (options_.force_budget_n) options.force_budget_n = force_budget_n_;
     options.ladder = options_.ladder;
     options.online_planner = online_planner_;
     if (setup_->map->orientations() > 1) {
