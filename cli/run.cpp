@@ -23,12 +23,14 @@
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/evaluation/records/episode_json.h"
+#include "feeler/evaluation/records/fault_bands.h"
 #include "feeler/evaluation/records/run_summary.h"
 #include "feeler/evaluation/records/scene_geometry.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/episode_video.h"
 #include "feeler/workflow/perception/perceive_table.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -137,6 +139,12 @@ void WriteVideo(const Flags& flags, const Session& session, const std::function<
   workflow::WriteVideo(films, flags.video, Interruptible(bar, session));
 }
 
+nlohmann::json ContactJson(const workflow::ContactSpeeds& speeds) {
+  return {{"stiffness_n_m", speeds.stiffness_n_m},
+          {"force_per_speed_n_s_m", speeds.force_per_speed_n_s_m},
+          {"speed_m_s", speeds.speed_m_s}};
+}
+
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = Parallelism(flags.jobs);
@@ -191,10 +199,12 @@ void Run(const Flags& flags, Session& session) {
     }
   }
   std::vector<evaluation::EpisodeSummaryRow> rows;
+  evaluation::FaultBands bands;
   int solved_online = 0;  // though a database was to answer
   const auto on_record = [&](const workflow::EpisodeRecord& record) {
     if (flags.policy == "database" && record.policy != flags.policy) ++solved_online;
     rows.push_back(evaluation::SummaryRow(record));
+    bands.Add(record);
     if (out) out->Write(evaluation::ToJson(record).dump() + "\n");
   };
   ProgressBar bar("episodes");
@@ -227,14 +237,17 @@ void Run(const Flags& flags, Session& session) {
          solved_online, rows.size(), flags.db);
   }
   const evaluation::RunSummary summary = evaluation::Summarize(rows);
+  const auto passed = std::ranges::count_if(rows, [&](const auto& row) { return row.peak_force_n > force_budget_n; });
+  const auto speeds = workflow::NominalContactSpeeds(setup->model, force_budget_n);
   if (flags.json) {
     nlohmann::json json = evaluation::ToJson(summary);
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["solved_online"] = solved_online;
     json["force_budget_n"] = force_budget_n;
-    json["force_budget_passed"] =
-        std::ranges::count_if(rows, [&](const auto& row) { return row.peak_force_n > force_budget_n; });
+    json["force_budget_passed"] = passed;
+    if (speeds) json["contact"] = ContactJson(*speeds);
+    if (!bands.empty()) json["bands"] = bands.ToJson();
     json["noise"] = flags.noise;
     json["placement"] = workflow::ToString(options.perception ? workflow::Placement::kWorkspace : placement);
     json["perception"] = flags.perception.empty() ? nlohmann::json() : nlohmann::json(flags.perception);
@@ -244,6 +257,13 @@ void Run(const Flags& flags, Session& session) {
   } else {
     Print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
           flags.seed, summary.episodes, evaluation::ToText(summary));
+    Print("force budget     {:g} N, passed in {} episodes\n", force_budget_n, passed);
+    if (speeds) {
+      Print("contact          {:.2f}, {:.2f}, {:.2f} N per mm/s along x, y, z\n",
+            1e-3 * speeds->force_per_speed_n_s_m[0], 1e-3 * speeds->force_per_speed_n_s_m[1],
+            1e-3 * speeds->force_per_speed_n_s_m[2]);
+    }
+    Print("{}", bands.ToText());
   }
   if (session.cancellation->cancelled()) {
     Note("feeler: interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);

@@ -242,18 +242,27 @@ void ReadVerdict(const Fields& fields, Task& task) {
                                                                task.tolerance.vertical_m, task.insertion_depth_m));
   }
 
-  const auto cost = fields.Numbers("feeler_cost", 3, "cost per cell, per contact and per action");
+  const auto cost =
+      fields.Numbers("feeler_cost", -1, "cost per cell (one, or one per axis), per contact and per action");
   for (const double weight : cost) fields.CheckRange("feeler_cost", weight, 0, 1e6);
-  if (cost[0] == 0 && cost[2] == 0) {
+  if (cost.size() == 5) {
+    task.cost = CostPerAxis({cost[0], cost[1], cost[2]}, cost[3], cost[4]);
+  } else if (cost.size() == 3) {
+    task.cost = {cost[0], cost[1], cost[2]};
+  } else {
+    fields.FailNumber(
+        "feeler_cost", fmt::format("has {} values instead of 3", cost.size()),
+        "give 3: cost per cell, per contact and per action; or 5: per cell along x, y, z, then the others");
+  }
+  if (task.cost.per_cell == 0 && task.cost.per_action == 0) {
     fields.FailNumber("feeler_cost", "is zero per cell and per action", "a move must cost something");
   }
-  task.cost = {cost[0], cost[1], cost[2]};
 
   const auto optional = [&](const char* field, double low, double high, double& value) {
     if (fields.HasNumeric(field)) value = fields.Number(field, "one number", low, high);
   };
   optional("feeler_transfer_speed", 1e-4, 10.0, task.times.transfer_speed_m_s);
-  optional("feeler_probe_speed", "feeler_force_budget", 1e-4, 10.0, task.times.probe_speed_m_s);
+  optional("feeler_probe_speed", 1e-4, 10.0, task.times.probe_speed_m_s);
   optional("feeler_force_budget", 1e-3, 1e6, task.force_budget_n);
   optional("feeler_time_per_move", 0.0, 100.0, task.times.time_per_move_s);
   optional("feeler_time_per_contact", 0.0, 100.0, task.times.time_per_contact_s);

@@ -50,7 +50,7 @@ ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const 
   if (!std::isfinite(time_constant_s)) return contact;
   const double stiffness = 1.0 / std::pow(largest_impedance * time_constant_s * damping_ratio, 2);  // per kg
   const double damping = 2.0 / (largest_impedance * time_constant_s);
-  contact.stiffness_n_m = contact.held_mass_kg * stiffness;
+  contact.stiffness_n_m = contact.mass_kg() * stiffness;
   contact.damping_ratio = damping / (2.0 * std::sqrt(stiffness));
   return contact;
 }

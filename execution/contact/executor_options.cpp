@@ -35,6 +35,7 @@ void Validate(const ExecutorOptions& options) {
   RequirePositive("retreat_m", options.retreat_m);
   RequirePositive("confirm_limit_m", options.confirm_limit_m);
   RequirePositive("insertion_speed_m_s", options.insertion_speed_m_s);
+  RequirePositive("sliding_speed_m_s", options.sliding_speed_m_s);
   RequirePositive("insertion_force_limit_n", options.insertion_force_limit_n);
   RequirePositive("time_limit_s", options.time_limit_s);
   RequirePositive("motion_limit", options.motion_limit);

@@ -27,15 +27,17 @@ struct ExecutorOptions {
   double sure_overtravel_cells = 0.75;  ///< where every hypothesis predicts contact
   /// The probe begins this far before the nearest predicted contact. A truth lies half a cell off its hypothesis at
   /// most (until a contact has tied the lattice to it); the rest is for errors of tracking.
-  double fast_margin_cells = 1.0;
+  double fast_margin_cells = 0.65;
   double free_margin_cells = 0.75;  ///< a move is known to be free if no prediction is nearer behind its end
   double retreat_m = 0.0005;        ///< at least so far off a wall after contact, or the next sideways move triggers
   /// Every axis across the insertion is felt until its position is known this well: once, unless the limit is tighter
   /// than what one contact tells (shortfall_m).
   double confirm_limit_m = 0.0005;
-  int confirm_attempts = 4;  ///< touches of axes across the insertion that no face has pinned
-  int graze_attempts = 3;    ///< shifts of the lattice by edges met within one episode
-  double insertion_speed_m_s = 0.02;
+  int confirm_attempts = 4;           ///< touches of axes across the insertion that no face has pinned
+  int graze_attempts = 3;             ///< shifts of the lattice by edges met within one episode
+  double insertion_speed_m_s = 0.02;  ///< where a wall may be met; slower where the force budget asks for it
+  /// Between the walls of the opening, where nothing is in front: behind the mouth, until the bottom may come.
+  double sliding_speed_m_s = 0.05;
   double insertion_force_limit_n = 60.0;
   double insertion_overdrive_m = 0.001;  ///< commanded beyond the depth, so that a compliant tool reaches it
   int motion_limit = 400;                ///< motions of one episode, whatever the policy

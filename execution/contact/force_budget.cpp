@@ -7,7 +7,7 @@ namespace feeler::execution {
 
 double ForcePerSpeed(const ContactResponse& contact) {
   const double impact =
-      std::max(1.0, 2.0 * contact.damping_ratio) * std::sqrt(contact.held_mass_kg * contact.stiffness_n_m);
+      std::max(1.0, 2.0 * contact.damping_ratio) * std::sqrt(contact.mass_kg() * contact.stiffness_n_m);
   return impact + contact.stiffness_n_m * contact.reaction_time_s;
 }
 

@@ -16,6 +16,6 @@ double ForcePerSpeed(const ContactResponse& contact);
 /// The speed (m/s) that uses kShareOfBudget of `budget_n` by that law; the rest is for what the law leaves out: the
 /// push of the controller and contacts beside the axis of the tool.
 double SpeedWithinBudget(const ContactResponse& contact, double budget_n);
-inline constexpr double kShareOfBudget = 0.88;
+inline constexpr double kShareOfBudget = 0.85;
 
 }  // namespace feeler::execution
