@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "feeler/cli/commands.h"
 #include "feeler/cli/common/console.h"
@@ -14,8 +17,11 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
+#include "feeler/env/model/task_file.h"
+#include "feeler/execution/contact/executor_options.h"
 #include "feeler/planner/policy/evaluate.h"
 #include "feeler/workflow/setup/bundle.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -66,6 +72,21 @@ policies::StoredProblem Find(policies::Database& database, const Flags& flags) {
   return *stored;
 }
 
+/// Budget that a plan in seconds was made for, and the greatest force predicted of its probes; empty for other costs,
+/// and where the task is not at hand.
+std::optional<std::pair<double, double>> ForceOf(const policies::DatabaseIdentity& identity) {
+  if (workflow::SetupOptionsOf(identity).cost_kind != CostKind::kTime) return std::nullopt;
+  try {
+    const env::TaskModel model = env::LoadTask(identity.task);
+    const auto speeds = workflow::NominalContactSpeeds(model, model.task.force_budget_n);
+    if (!speeds) return std::nullopt;
+    const execution::ExecutorOptions options;
+    return std::pair{speeds->budget_n, workflow::WorstPredictedForce(*speeds, options.probe_speed_m_s)};
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
 void Info(const Flags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::DatabaseIdentity& identity = database.identity();
@@ -75,9 +96,16 @@ void Info(const Flags& flags) {
     json["fingerprint"] = identity.fingerprint;
     json["opening"] = identity.opening;
     json["goal"] = identity.goal;
-    json["cost"] = {{"per_cell", identity.cost.per_cell},
-                    {"per_contact", identity.cost.per_contact},
-                    {"per_action", identity.cost.per_action}};
+    nlohmann::json per_cell = identity.cost.per_cell;
+    if (!identity.cost.one_per_cell()) {
+      per_cell = {identity.cost.PerCell(0), identity.cost.PerCell(1), identity.cost.PerCell(2)};
+    }
+    json["cost"] = {
+        {"per_cell", per_cell}, {"per_contact", identity.cost.per_contact}, {"per_action", identity.cost.per_action}};
+    if (const auto force = ForceOf(identity)) {
+      json["force_budget_n"] = force->first;
+      json["worst_predicted_force_n"] = force->second;
+    }
     json["cost_unit"] = workflow::CostUnit(identity);
     json["settings"] = nlohmann::json::parse(identity.settings);
     json["created_by"] = identity.created_by;
@@ -89,8 +117,14 @@ void Info(const Flags& flags) {
   Print("opening, goal       {}, {}\n", identity.opening, identity.goal);
   Print("settings            {}\n", identity.settings);
   const CostWeights& cost = identity.cost;
-  Print("cost                {:g} a cell, {:g} a contact, {:g} a move, in {}\n", cost.per_cell, cost.per_contact,
-        cost.per_action, workflow::CostUnit(identity));
+  const std::string per_cell = cost.one_per_cell() ? fmt::format("{:g} a cell", cost.per_cell)
+                                                   : fmt::format("{:g}, {:g}, {:g} a cell along x, y, z",
+                                                                 cost.PerCell(0), cost.PerCell(1), cost.PerCell(2));
+  Print("cost                {}, {:g} a contact, {:g} a move, in {}\n", per_cell, cost.per_contact, cost.per_action,
+        workflow::CostUnit(identity));
+  if (const auto force = ForceOf(identity)) {
+    Print("force               planned for {:g} N, {:.1f} N at worst by prediction\n", force->first, force->second);
+  }
   PrintInfo(database.Info(), workflow::CostUnit(identity));
   Print("content             {}\n", database.ContentDigest());
 }

@@ -1,6 +1,7 @@
 // feeler run: seeded episodes in simulation.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -22,12 +23,14 @@
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/evaluation/records/episode_json.h"
+#include "feeler/evaluation/records/fault_bands.h"
 #include "feeler/evaluation/records/run_summary.h"
 #include "feeler/evaluation/records/scene_geometry.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/episode_video.h"
 #include "feeler/workflow/perception/perceive_table.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -54,6 +57,7 @@ struct Flags {
   std::int64_t video_episode = 0;
   int jobs = 1;
   double confirm_limit_m = 0.0;  ///< 0: not given
+  double force_budget_n = 0.0;   ///< 0: not given
   bool no_ladder = false;
   bool withhold_true_pose = false;
   bool json = false;
@@ -135,6 +139,12 @@ void WriteVideo(const Flags& flags, const Session& session, const std::function<
   workflow::WriteVideo(films, flags.video, Interruptible(bar, session));
 }
 
+nlohmann::json ContactJson(const workflow::ContactSpeeds& speeds) {
+  return {{"stiffness_n_m", speeds.stiffness_n_m},
+          {"force_per_speed_n_s_m", speeds.force_per_speed_n_s_m},
+          {"speed_m_s", speeds.speed_m_s}};
+}
+
 void Run(const Flags& flags, Session& session) {
   RequireSane(flags);
   const Parallelism jobs = Parallelism(flags.jobs);
@@ -168,6 +178,12 @@ void Run(const Flags& flags, Session& session) {
   if (!flags.perception.empty()) options.perception = PerceptionFor(flags.table, *setup);
   options.ladder = !flags.no_ladder && workflow::UsesLadder(flags.policy);
   if (flags.confirm_limit_m > 0.0) options.confirm_limit_m = flags.confirm_limit_m;
+  if (flags.force_budget_n > 0.0) options.force_budget_n = flags.force_budget_n;
+  const double force_budget_n =
+      workflow::ForceBudget(setup->task(), workflow::ParseFaults(flags.noise), options.force_budget_n);
+  if (!options.force_budget_n && force_budget_n > setup->task().force_budget_n) {
+    fmt::print(stderr, "force budget: {:g} N, as the noise of the force sensor asks for\n", force_budget_n);
+  }
   options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
@@ -183,10 +199,12 @@ void Run(const Flags& flags, Session& session) {
     }
   }
   std::vector<evaluation::EpisodeSummaryRow> rows;
+  evaluation::FaultBands bands;
   int solved_online = 0;  // though a database was to answer
   const auto on_record = [&](const workflow::EpisodeRecord& record) {
     if (flags.policy == "database" && record.policy != flags.policy) ++solved_online;
     rows.push_back(evaluation::SummaryRow(record));
+    bands.Add(record);
     if (out) out->Write(evaluation::ToJson(record).dump() + "\n");
   };
   ProgressBar bar("episodes");
@@ -219,11 +237,17 @@ void Run(const Flags& flags, Session& session) {
          solved_online, rows.size(), flags.db);
   }
   const evaluation::RunSummary summary = evaluation::Summarize(rows);
+  const auto passed = std::ranges::count_if(rows, [&](const auto& row) { return row.peak_force_n > force_budget_n; });
+  const auto speeds = workflow::NominalContactSpeeds(setup->model, force_budget_n);
   if (flags.json) {
     nlohmann::json json = evaluation::ToJson(summary);
     json["task"] = setup->task().name;
     json["policy"] = flags.policy;
     json["solved_online"] = solved_online;
+    json["force_budget_n"] = force_budget_n;
+    json["force_budget_passed"] = passed;
+    if (speeds) json["contact"] = ContactJson(*speeds);
+    if (!bands.empty()) json["bands"] = bands.ToJson();
     json["noise"] = flags.noise;
     json["placement"] = workflow::ToString(options.perception ? workflow::Placement::kWorkspace : placement);
     json["perception"] = flags.perception.empty() ? nlohmann::json() : nlohmann::json(flags.perception);
@@ -233,6 +257,13 @@ void Run(const Flags& flags, Session& session) {
   } else {
     Print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
           flags.seed, summary.episodes, evaluation::ToText(summary));
+    Print("force budget     {:g} N, passed in {} episodes\n", force_budget_n, passed);
+    if (speeds) {
+      Print("contact          {:.2f}, {:.2f}, {:.2f} N per mm/s along x, y, z\n",
+            1e-3 * speeds->force_per_speed_n_s_m[0], 1e-3 * speeds->force_per_speed_n_s_m[1],
+            1e-3 * speeds->force_per_speed_n_s_m[2]);
+    }
+    Print("{}", bands.ToText());
   }
   if (session.cancellation->cancelled()) {
     Note("feeler: interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);
@@ -266,6 +297,11 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
   AddReal(*command, "--confirm-limit", flags->confirm_limit_m, 1e-6, 1.0,
           "touch until the position across the insertion is known this well, m, default: 0.0005", false);
+  AddReal(
+      *command, "--force-budget", flags->force_budget_n, 1e-3, 1e6,
+      "no contact is to push harder, N: the tool comes as fast as that allows, default: the task's (25), more where "
+      "the noise of the force sensor asks for it",
+      false);
   command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
                     "leave the true pose out of what the environment tells; the records stay the same");
   AddJobs(*command, flags->jobs, "threads; the records do not depend on it");

@@ -14,6 +14,8 @@ std::string_view ToString(StopReason reason) {
   return "";
 }
 
+ContactResponse Robot::Contact(const Eigen::Vector3d& /*direction*/) const { return {}; }
+
 CameraView Robot::Look() { return {}; }
 
 MotionResult Robot::FollowTwist(const TwistMotion& /*motion*/) {

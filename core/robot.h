@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct CompliantMotion {
   double time_limit_s = 10.0;
   Eigen::Vector3d stiffness_n_m{1000, 1000, 4000};  ///< in tool axes
   double rotational_stiffness_nm_rad = 200.0;
+  double rest_time_s = 0.05;  ///< it ends when the tool has been at rest so long; 0: when the way has been commanded
 };
 
 /// A motion with a given velocity, for a time: of a frame that is fixed to the tool (that of the camera), in its own
@@ -63,9 +65,30 @@ struct MotionResult {
   StopReason reason = StopReason::kReached;
   double travelled_m = 0.0;  ///< along the commanded direction or path, measured
   bool contact = false;
+  /// Greatest net force of contact on the tool, N: without the noise of the sensor where the robot can tell (a
+  /// simulation), else as measured.
   double peak_force_n = 0.0;
   Pose world_T_tool = Pose::Identity();  ///< measured pose when the motion ended (for a contact: at the contact)
   std::string detail;                    ///< for people; empty when all went well
+};
+
+/// What a contact of the tool is like as the robot stands, along one direction: what the robot declares of itself, and
+/// what says how fast the tool may come (execution/contact/force_budget.h). The defaults are for robots that do not
+/// know: a heavy arm with hard parts.
+struct ContactResponse {
+  /// Parts that meet beside the axis of the tool turn a little: what they stop is between the two masses, this much of
+  /// the free one and never more than the held one, as the simulated contacts show.
+  static constexpr double kOfFreeMass = 1.3;
+
+  double held_mass_kg = 25.0;      ///< effective mass where the tool cannot turn (met face to face)
+  double free_mass_kg = 25.0;      ///< where it can (met at the tip); not above held_mass_kg
+  double stiffness_n_m = 6e4;      ///< of the parts in contact, force per indentation
+  double damping_ratio = 1.0;      ///< of that contact; 0: elastic
+  double reaction_time_s = 0.004;  ///< from a force that counts as a contact until the tool is being stopped
+  double force_noise_n = 0.0;      ///< standard deviation of a force reading
+
+  /// What an obstacle has to stop.
+  double mass_kg() const { return std::min(held_mass_kg, kOfFreeMass * free_mass_kg); }
 };
 
 /// The robot as the executor sees it: implemented by the simulation, or by a driver of a real arm. All poses are of the
@@ -88,6 +111,9 @@ class Robot {
   virtual MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) = 0;
   virtual MotionResult Guarded(const GuardedMotion& motion) = 0;
   virtual MotionResult Compliant(const CompliantMotion& motion) = 0;
+
+  /// As the tool stands, for a contact met along `direction` (unit vector, world axes).
+  virtual ContactResponse Contact(const Eigen::Vector3d& direction) const;
 
   // Robots with an eye on the wrist. Without one: an empty view, and no motion (kUnplanned).
   virtual CameraView Look();

@@ -21,6 +21,12 @@ std::string_view ToString(GoalKind kind) { return kind == GoalKind::kSingleton ?
 
 std::string_view ToString(CostKind kind) { return kind == CostKind::kDistance ? "distance" : "time"; }
 
+CostWeights CostPerAxis(const std::array<double, 3>& per_cell, double per_contact, double per_action) {
+  CostWeights cost{*std::ranges::min_element(per_cell), per_contact, per_action};
+  for (std::size_t axis = 0; axis < 3; ++axis) cost.beyond_per_cell[axis] = per_cell[axis] - cost.per_cell;
+  return cost;
+}
+
 CostWeights TimeCost(const Task& task) {
   // A weight per cell cannot tell cells known to be free from those that are probed: the share that policies probe,
   // measured 0.17 to 0.28 for cuboids of 7 to 15 cells.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,16 +23,23 @@ struct UncertainAxis {
   bool angular() const { return kind == AxisKind::kYaw || kind == AxisKind::kPitch; }
 };
 
-/// Cost of a guarded move = per_cell * cells travelled + per_contact * contact + per_action.
+/// Cost of a guarded move = cost per cell along its axis * cells travelled + per_contact * contact + per_action.
 struct CostWeights {
-  double per_cell = 1.0;
+  double per_cell = 1.0;  ///< along the axis where a cell costs least
   double per_contact = 0.0;
   double per_action = 0.0;
-  double Of(const Outcome& outcome) const {
-    return per_cell * outcome.cells + (outcome.contact ? per_contact : 0.0) + per_action;
+  /// What a cell along x, y, z costs beyond that: not negative, at least one of them 0. All 0: one number for all axes.
+  std::array<double, 3> beyond_per_cell{};
+
+  double PerCell(int axis) const { return per_cell + beyond_per_cell[static_cast<std::size_t>(axis)]; }
+  bool one_per_cell() const { return beyond_per_cell == std::array<double, 3>{}; }
+  double Of(const Outcome& outcome, Direction direction) const {
+    return PerCell(AxisOf(direction)) * outcome.cells + (outcome.contact ? per_contact : 0.0) + per_action;
   }
   bool operator==(const CostWeights&) const = default;
 };
+/// The weights with one cost of a cell per axis.
+CostWeights CostPerAxis(const std::array<double, 3>& per_cell, double per_contact, double per_action);
 
 /// What the cost of a policy counts: what the task file says (distance, as a rule), or seconds on the robot.
 enum class CostKind { kDistance, kTime };
@@ -77,6 +85,9 @@ struct Task {
   Tolerance tolerance;
   CostWeights cost;
   MotionTimes times;
+  /// No contact of tool and target is to push harder, N: how fast the tool may come follows from it
+  /// (execution/contact/force_budget.h). Not of the geometry: a budget changes speeds, not what a policy may do.
+  double force_budget_n = 25.0;
   GoalKind goal = GoalKind::kSingleton;
   std::vector<int> move_lengths = {1, 2, 4, 8, 16};
   Eigen::Vector3d workspace_m{0.2, 0.2, 0.1};   ///< half extents of the workspace of the tool

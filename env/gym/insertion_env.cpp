@@ -148,6 +148,14 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const ResetOptions& options) 
   }
   variation_ = options.randomize ? DrawVariation(robot_.world().scene().randomization, seed, options.episode)
                                  : EpisodeVariation{};
+  if (options.physics) {
+    variation_.physics.contact_friction *= options.physics->contact_friction;
+    variation_.physics.tool_slip_m += options.physics->tool_slip_m;
+    variation_.physics.tool_turn_rad += options.physics->tool_turn_rad;
+    variation_.physics.tool_mass *= options.physics->tool_mass;
+    variation_.physics.clearance_m += options.physics->clearance_m;
+    variation_.physics.joint_friction_nm += options.physics->joint_friction_nm;
+  }
   // Drawn even where a pose is given, for the check of the extents.
   RandomStream random(seed, options.episode, "true-pose");
   Pose drawn = DrawTruePose(task(), estimate_, extents, random);

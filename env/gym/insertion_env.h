@@ -100,6 +100,7 @@ struct ResetOptions {
   /// these, and transfers keep clear of all of them.
   std::vector<Pose> hypotheses;
   NoiseOptions noise;
+  std::optional<PhysicsVariation> physics;  ///< on top of what the task file randomizes
   StartPlace start = StartPlace::kStartPose;
   bool withhold_true_pose = false;  ///< all else is the same, bit for bit
   bool randomize = true;            ///< within the ranges of the task file, if it has any; a given truth is not turned

@@ -126,6 +126,9 @@ std::string Fingerprint(const TaskModel& task_model, Opening opening) {
   digest.AddReal(task.cost.per_cell);
   digest.AddReal(task.cost.per_contact);
   digest.AddReal(task.cost.per_action);
+  if (!task.cost.one_per_cell()) {
+    for (const double beyond : task.cost.beyond_per_cell) digest.AddReal(beyond);
+  }
   digest.Add(static_cast<int>(task.goal));
   digest.Add(IndexOf(task.insertion));
   digest.AddReal(task.tolerance.lateral_m);

@@ -17,11 +17,11 @@ namespace feeler::env {
 namespace {
 
 constexpr std::array kNumericFields = {
-    "feeler_resolution",        "feeler_min_cells",          "feeler_max_cells",       "feeler_start_offset",
-    "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth", "feeler_cell",
-    "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle", "feeler_cost",
-    "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",  "feeler_probe_speed",
-    "feeler_time_per_move",     "feeler_time_per_contact",   "feeler_workspace_center"};
+    "feeler_resolution",        "feeler_min_cells",          "feeler_max_cells",        "feeler_start_offset",
+    "feeler_workspace",         "feeler_move_lengths",       "feeler_insertion_depth",  "feeler_cell",
+    "feeler_tolerance_lateral", "feeler_tolerance_vertical", "feeler_tolerance_angle",  "feeler_cost",
+    "feeler_flange_position",   "feeler_flange_quaternion",  "feeler_transfer_speed",   "feeler_probe_speed",
+    "feeler_force_budget",      "feeler_time_per_move",      "feeler_time_per_contact", "feeler_workspace_center"};
 constexpr std::array kTextFields = {"feeler_axes", "feeler_insertion_axis", "feeler_goal"};
 
 constexpr int kMaxCells = 64;       ///< hypotheses along an axis; beyond it a number is a slip, not a wish
@@ -242,18 +242,28 @@ void ReadVerdict(const Fields& fields, Task& task) {
                                                                task.tolerance.vertical_m, task.insertion_depth_m));
   }
 
-  const auto cost = fields.Numbers("feeler_cost", 3, "cost per cell, per contact and per action");
+  const auto cost =
+      fields.Numbers("feeler_cost", -1, "cost per cell (one, or one per axis), per contact and per action");
   for (const double weight : cost) fields.CheckRange("feeler_cost", weight, 0, 1e6);
-  if (cost[0] == 0 && cost[2] == 0) {
+  if (cost.size() == 5) {
+    task.cost = CostPerAxis({cost[0], cost[1], cost[2]}, cost[3], cost[4]);
+  } else if (cost.size() == 3) {
+    task.cost = {cost[0], cost[1], cost[2]};
+  } else {
+    fields.FailNumber(
+        "feeler_cost", fmt::format("has {} values instead of 3", cost.size()),
+        "give 3: cost per cell, per contact and per action; or 5: per cell along x, y, z, then the others");
+  }
+  if (task.cost.per_cell == 0 && task.cost.per_action == 0) {
     fields.FailNumber("feeler_cost", "is zero per cell and per action", "a move must cost something");
   }
-  task.cost = {cost[0], cost[1], cost[2]};
 
   const auto optional = [&](const char* field, double low, double high, double& value) {
     if (fields.HasNumeric(field)) value = fields.Number(field, "one number", low, high);
   };
   optional("feeler_transfer_speed", 1e-4, 10.0, task.times.transfer_speed_m_s);
   optional("feeler_probe_speed", 1e-4, 10.0, task.times.probe_speed_m_s);
+  optional("feeler_force_budget", 1e-3, 1e6, task.force_budget_n);
   optional("feeler_time_per_move", 0.0, 100.0, task.times.time_per_move_s);
   optional("feeler_time_per_contact", 0.0, 100.0, task.times.time_per_contact_s);
 

@@ -151,7 +151,7 @@ void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
                          sensor_.PairFlag(ContactPair::kRobotEnvironment) || sensor_.PairFlag(ContactPair::kRobotRobot);
   if (forbidden && !statistics_.forbidden_now) ++statistics_.forbidden_contacts;
   statistics_.forbidden_now = forbidden;
-  peak_force_n_ = std::max(peak_force_n_, sensor_.raw().force_n.norm());
+  peak_force_n_ = std::max(peak_force_n_, sensor_.exact().force_n.norm());
   tool_at_sensing_ = before;
   if (observer_ && world_.time_s() >= next_observation_s_ - 1e-9) {
     observer_(world_);
@@ -423,6 +423,10 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
   RequirePositive(motion.stiffness_n_m.minCoeff(), "compliant motion", "the smallest stiffness (N/m)");
   RequirePositive(motion.stiffness_n_m.maxCoeff(), "compliant motion", "the largest stiffness (N/m)");
   RequirePositive(motion.rotational_stiffness_nm_rad, "compliant motion", "the rotational stiffness (Nm/rad)");
+  if (!(motion.rest_time_s >= 0.0)) {
+    throw InputError("compliant motion", fmt::format("the time at rest is {} s", motion.rest_time_s),
+                     "give zero or more");
+  }
   return Guard([&] {
     const Pose start = ToolPose();
     std::vector<Pose> way_points = motion.world_T_tool;
@@ -443,7 +447,6 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
     MotionResult result;
     const double start_s = world_.time_s();
     const double path_before_m = statistics_.path_length_m;
-    constexpr double kRestTime_s = 0.05;
     double resting_s = 0.0;
     for (;;) {
       const double t = world_.time_s() - start_s;
@@ -465,7 +468,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
       if (t >= trajectory.duration_s()) {
         const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
         resting_s = twist.head<3>().norm() < options_.settle_speed_m_s ? resting_s + world_.timestep_s() : 0.0;
-        if (resting_s >= kRestTime_s) {
+        if (resting_s >= motion.rest_time_s) {
           const bool there = (ToolPose().translation() - goal.translation()).norm() <= options_.compliant_reach_m;
           result.reason = there ? StopReason::kReached : StopReason::kContact;
           result.contact = sensor_.ToolFlag();

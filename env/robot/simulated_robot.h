@@ -119,6 +119,9 @@ class SimulatedRobot : public Robot {
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult Guarded(const GuardedMotion& motion) override;
   MotionResult Compliant(const CompliantMotion& motion) override;
+  /// Effective mass from the inertia of the joints and the Jacobian; stiffness and damping are those of the contacts
+  /// between tool and target in MuJoCo (solref, solimp), which it makes proportional to that mass.
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override;
   /// The wrist camera's picture of this instant. Throws InputError when the machine cannot render.
   CameraView Look() override;
   /// Joint-space tracking of the integrated twist at every physics step, within the speed and position limits of the
@@ -202,7 +205,7 @@ class SimulatedRobot : public Robot {
   Eigen::Matrix3d held_orientation_ = Eigen::Matrix3d::Identity();  ///< what guarded moves hold
   std::optional<Pose> set_point_;                                   ///< of Servo
   Pose tool_at_sensing_ = Pose::Identity();  ///< measured pose in the state that the sensor describes
-  double peak_force_n_ = 0.0;                ///< measured, since the motion began
+  double peak_force_n_ = 0.0;                ///< exact, since the motion began
   double deadline_s_ = std::numeric_limits<double>::infinity();
   std::function<void(const World&)> observer_;
   double observer_period_s_ = 0.0;

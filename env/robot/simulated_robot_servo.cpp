@@ -2,19 +2,57 @@
 // low-level step of learners, the zero of the wrench.
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "feeler/core/error.h"
 #include "feeler/env/robot/simulated_robot.h"
 
 namespace feeler::env {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
+}  // namespace
 
 CameraView SimulatedRobot::Look() {
   if (!wrist_camera_) wrist_camera_ = std::make_unique<WristCamera>(scene_, options_.wrist_camera);
   return wrist_camera_->Look(world_.data(), &image_random_);
+}
+
+ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const {
+  const mjModel& model = world_.model();
+  // MuJoCo pushes with the acceleration -b v - k r, taken on by the share `impedance` (its manual, "Solver
+  // parameters"): of the parts, the stiffest geoms decide.
+  double time_constant_s = kNone;
+  double damping_ratio = 1.0;
+  double largest_impedance = 0.0;
+  for (int g = 0; g < model.ngeom; ++g) {
+    if (model.geom_bodyid[g] != scene_->tool_body && model.geom_bodyid[g] != scene_->target_body) continue;
+    const mjtNum* reference = model.geom_solref + mjNREF * g;
+    const mjtNum* solver = model.geom_solimp + mjNIMP * g;
+    if (reference[0] <= 0.0 || reference[0] >= time_constant_s) continue;  // direct constants: not ours to shorten
+    time_constant_s = std::max<double>(reference[0], 2.0 * world_.timestep_s());
+    damping_ratio = reference[1];
+    largest_impedance = solver[1];
+  }
+  ContactResponse contact;
+  const Matrix6 mobility = frame_.jacobian * world_.Inertia().inverse() * frame_.jacobian.transpose();
+  const Matrix6 inertia = mobility.inverse();
+  contact.held_mass_kg = 1.0 / direction.dot(inertia.topLeftCorner<3, 3>().ldlt().solve(direction));
+  contact.free_mass_kg = 1.0 / direction.dot(mobility.topLeftCorner<3, 3>() * direction);
+  contact.force_noise_n = noise_.force_noise_n;
+  contact.reaction_time_s = 2.0 * world_.timestep_s() + noise_.force_delay_s;
+  if (!std::isfinite(time_constant_s)) return contact;
+  const double stiffness = 1.0 / std::pow(largest_impedance * time_constant_s * damping_ratio, 2);  // per kg
+  const double damping = 2.0 / (largest_impedance * time_constant_s);
+  contact.stiffness_n_m = contact.mass_kg() * stiffness;
+  contact.damping_ratio = damping / (2.0 * std::sqrt(stiffness));
+  return contact;
 }
 
 std::optional<JointReference> SimulatedRobot::Advance(const Vector6& wanted, TwistReference& reference,

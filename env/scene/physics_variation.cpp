@@ -116,6 +116,20 @@ void Narrow(const Scene& scene, double clearance_m, mjModel& m) {
   }
 }
 
+/// The tool as a whole lies otherwise in the gripper.
+void Slip(const Scene& scene, const PhysicsVariation& variation, mjModel& m) {
+  Eigen::Map<Eigen::Vector3d> position(m.body_pos + 3 * scene.tool_body);
+  mjtNum* const q = m.body_quat + 4 * scene.tool_body;
+  const Eigen::Quaterniond held(q[0], q[1], q[2], q[3]);
+  position += held * variation.tool_slip_m;
+  const Eigen::Quaterniond turned =
+      held * Eigen::Quaterniond(Eigen::AngleAxisd(variation.tool_turn_rad, UnitVector(scene.task.insertion)));
+  q[0] = turned.w();
+  q[1] = turned.x();
+  q[2] = turned.y();
+  q[3] = turned.z();
+}
+
 }  // namespace
 
 void PhysicsVariation::Validate() const {
@@ -127,6 +141,10 @@ void PhysicsVariation::Validate() const {
   }
   if (!(tool_mass >= 0.1 && tool_mass <= 10.0)) {
     throw InputError("reset", fmt::format("the factor on the tool's mass is {}", tool_mass), "give 0.1 to 10");
+  }
+  if (!(tool_slip_m.norm() <= 0.05) || !(std::abs(tool_turn_rad) <= 1.0)) {
+    throw InputError("reset", "the tool has slipped by more than 50 mm or 1 rad, or by what is no number",
+                     "give less, in metres and rad");
   }
   if (!std::isfinite(clearance_m)) throw InputError("reset", "the clearance is not finite", "give metres");
 }
@@ -142,6 +160,7 @@ std::shared_ptr<const mjModel> VariedModel(const Scene& scene, const PhysicsVari
   }
   for (int geom = 0; geom < m.ngeom; ++geom) m.geom_friction[3 * geom] *= variation.contact_friction;
   if (variation.clearance_m != 0.0) Narrow(scene, variation.clearance_m, m);
+  if (!variation.tool_slip_m.isZero() || variation.tool_turn_rad != 0.0) Slip(scene, variation, m);
   if (variation.tool_mass != 1.0) {
     for (int body = scene.tool_body; body < m.nbody; ++body) {
       int ancestor = body;

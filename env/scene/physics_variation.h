@@ -15,6 +15,10 @@ struct PhysicsVariation {
   double contact_friction = 1.0;                        ///< factor on the sliding friction of every contact
   double tool_mass = 1.0;                               ///< factor on mass and inertia of the tool
   double clearance_m = 0.0;                             ///< added on each side of the tool across the insertion axis
+  /// How the tool has slipped in the gripper, which the robot does not know: shifted in its own axes, and turned about
+  /// the insertion axis.
+  Eigen::Vector3d tool_slip_m = Eigen::Vector3d::Zero();
+  double tool_turn_rad = 0.0;
   bool operator==(const PhysicsVariation&) const = default;
   /// Throws InputError naming the number that makes no sense.
   void Validate() const;

@@ -36,6 +36,7 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["task"] = record.task;
   json["policy"] = record.policy;
   json["noise"] = record.noise;
+  if (!record.fault_values.empty()) json["fault_values"] = record.fault_values;
   json["seed"] = record.seed;
   json["episode"] = record.episode;
   json["placement"] = record.placement;
@@ -78,6 +79,8 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   json["depth_m"] = record.depth_m;
   json["lateral_m"] = record.lateral_m;
   json["peak_force_n"] = record.peak_force_n;
+  json["force_budget_n"] = execution.force_budget_n;
+  json["budget_passings"] = execution.budget_passings;
   json["impulse_ns"] = record.impulse_ns;
   json["forbidden_contacts"] = record.forbidden_contacts;
   json["pictures"] = execution.pictures;

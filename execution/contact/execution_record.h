@@ -19,8 +19,8 @@ struct MoveRecord {
   std::optional<std::array<double, 2>> predicted_m;
   double travelled_m = 0.0;
   bool contact = false;
-  double peak_force_n = 0.0;
-  double duration_s = 0.0;  ///< on the clock of the robot, what came before it since the last motion included
+  double peak_force_n = 0.0;  ///< greatest net force of contact; exact in simulation, noise of the sensor left out
+  double duration_s = 0.0;    ///< on the clock of the robot, what came before it since the last motion included
 };
 
 /// One move of the policy and its answer: a branch of the policy graph that was taken.
@@ -62,6 +62,8 @@ struct ExecutionRecord {
   double sim_time_s = 0.0;
   double localization_time_s = 0.0;  ///< part of sim_time_s until the insertion began its approach
   double peak_force_n = 0.0;
+  double force_budget_n = 0.0;  ///< that it was carried out with; 0: none
+  int budget_passings = 0;      ///< motions whose peak force lies above it
   std::vector<LadderRecord> ladder;
   double policy_cpu_s = 0.0;  ///< measured: belongs under `timing`
 };

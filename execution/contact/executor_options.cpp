@@ -20,6 +20,12 @@ void RequirePositive(const char* option, double value) {
 void Validate(const ExecutorOptions& options) {
   RequirePositive("transfer_speed_m_s", options.transfer_speed_m_s);
   RequirePositive("probe_speed_m_s", options.probe_speed_m_s);
+  if (!(options.force_budget_n > options.contact_force_n)) {
+    throw InputError("executor options",
+                     "force_budget_n is " + std::to_string(options.force_budget_n) + ", and a contact is told from " +
+                         std::to_string(options.contact_force_n) + " N on",
+                     "give a larger budget");
+  }
   RequirePositive("contact_force_n", options.contact_force_n);
   RequirePositive("shortfall_m", options.shortfall_m);
   RequirePositive("overtravel_cells", options.overtravel_cells);
@@ -29,6 +35,7 @@ void Validate(const ExecutorOptions& options) {
   RequirePositive("retreat_m", options.retreat_m);
   RequirePositive("confirm_limit_m", options.confirm_limit_m);
   RequirePositive("insertion_speed_m_s", options.insertion_speed_m_s);
+  RequirePositive("sliding_speed_m_s", options.sliding_speed_m_s);
   RequirePositive("insertion_force_limit_n", options.insertion_force_limit_n);
   RequirePositive("time_limit_s", options.time_limit_s);
   RequirePositive("motion_limit", options.motion_limit);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "feeler/execution/contact/contact_evidence.h"
@@ -16,20 +17,27 @@ struct MatchOptions {
 /// How a policy is carried out. The defaults suit an ideal arm; `WithFriction` one with joint friction and force noise.
 struct ExecutorOptions {
   double transfer_speed_m_s = 0.25;  ///< through space known to be free, watched for contact
-  double probe_speed_m_s = 0.05;     ///< where a contact may come
-  double contact_force_n = 5.0;      ///< net force that counts as a contact
-  double shortfall_m = 0.0002;       ///< a motion that ends this far short of its target has met something soft or weak
-  double overtravel_cells = 0.25;    ///< beyond the commanded cell: a wall just behind it is felt, not grazed
+  double probe_speed_m_s = 0.05;     ///< where a contact may come; slower where the force budget asks for it
+  /// No contact while feeling is to push harder: the speed of each probe follows from it (force_budget.h). Infinite:
+  /// the probe speed everywhere.
+  double force_budget_n = std::numeric_limits<double>::infinity();
+  double contact_force_n = 5.0;    ///< net force that counts as a contact
+  double shortfall_m = 0.0002;     ///< a motion that ends this far short of its target has met something soft or weak
+  double overtravel_cells = 0.25;  ///< beyond the commanded cell: a wall just behind it is felt, not grazed
   double sure_overtravel_cells = 0.75;  ///< where every hypothesis predicts contact
-  double fast_margin_cells = 1.0;       ///< the probe begins this far before the nearest predicted contact
-  double free_margin_cells = 0.75;      ///< a move is known to be free if no prediction is nearer behind its end
-  double retreat_m = 0.0005;  ///< at least so far off a wall after contact, or the next sideways move triggers
+  /// The probe begins this far before the nearest predicted contact. A truth lies half a cell off its hypothesis at
+  /// most (until a contact has tied the lattice to it); the rest is for errors of tracking.
+  double fast_margin_cells = 0.65;
+  double free_margin_cells = 0.75;  ///< a move is known to be free if no prediction is nearer behind its end
+  double retreat_m = 0.0005;        ///< at least so far off a wall after contact, or the next sideways move triggers
   /// Every axis across the insertion is felt until its position is known this well: once, unless the limit is tighter
   /// than what one contact tells (shortfall_m).
   double confirm_limit_m = 0.0005;
-  int confirm_attempts = 4;  ///< touches of axes across the insertion that no face has pinned
-  int graze_attempts = 3;    ///< shifts of the lattice by edges met within one episode
-  double insertion_speed_m_s = 0.02;
+  int confirm_attempts = 4;           ///< touches of axes across the insertion that no face has pinned
+  int graze_attempts = 3;             ///< shifts of the lattice by edges met within one episode
+  double insertion_speed_m_s = 0.02;  ///< where a wall may be met; slower where the force budget asks for it
+  /// Between the walls of the opening, where nothing is in front: behind the mouth, until the bottom may come.
+  double sliding_speed_m_s = 0.05;
   double insertion_force_limit_n = 60.0;
   double insertion_overdrive_m = 0.001;  ///< commanded beyond the depth, so that a compliant tool reaches it
   int motion_limit = 400;                ///< motions of one episode, whatever the policy

@@ -15,10 +15,37 @@ namespace {
 constexpr double kStandoff = 1.5;
 /// A clear displacement in front of the mouth is looked for up to here.
 constexpr int kFarthestClear = 8;
+/// A shorter way between the walls is not worth motions of its own, cells.
+constexpr double kLeastSlide = 2.0;
+/// Of the way through the mouth: less, and something stood there.
+constexpr double kThrough = 0.5;
 
 Cell Nearest(const Eigen::Vector3d& cells) {
   return {static_cast<int>(std::lround(cells.x())), static_cast<int>(std::lround(cells.y())),
           static_cast<int>(std::lround(cells.z()))};
+}
+
+/// From in front of the mouth down to `bottom`. Slowly through the mouth, where a face may stand instead of the
+/// opening, and where the bottom may come; faster between the walls, if that saves anything.
+MotionReport GoDown(const Task& task, const Eigen::Vector3d& target, double depth, const Eigen::Vector3d& bottom,
+                    Mover& mover) {
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  const double slow_m_s = std::min(mover.options().insertion_speed_m_s, mover.SpeedInto(inward));
+  const double fast_m_s = mover.options().sliding_speed_m_s;
+  // A tool that is in by more than the tolerance of its depth has found the opening; the bottom comes no sooner than
+  // that above the depth.
+  const double surely = mover.Cells(task.tolerance.vertical_m);
+  const double begun = (mover.position() - target).dot(inward);
+  const double sliding = depth - 2.0 * surely;
+  if (begun > surely || !(slow_m_s < mover.options().insertion_speed_m_s) || sliding < kLeastSlide) {
+    return mover.Insert(bottom);
+  }
+  const MotionReport mouth = mover.Insert(target + surely * inward, slow_m_s, false);
+  const double reached = (mouth.end - target).dot(inward);
+  if (mouth.reason == StopReason::kForceLimit || reached < kThrough * surely) return mover.Insert(bottom);
+  const MotionReport slid = mover.Insert(target + (depth - surely) * inward, fast_m_s, false);
+  if (slid.reason == StopReason::kForceLimit) return slid;
+  return mover.Insert(bottom, slow_m_s);
 }
 
 }  // namespace
@@ -89,7 +116,7 @@ BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target
   const Eigen::Vector3d out = -UnitVector(task.insertion);
   const double depth = mover.Cells(task.insertion_depth_m);
   const double overdrive = mover.Cells(mover.options().insertion_overdrive_m);
-  const MotionReport report = mover.Insert(target - (depth + overdrive) * out);
+  const MotionReport report = GoDown(task, target, depth, target - (depth + overdrive) * out, mover);
   const Eigen::Vector3d displacement = report.end - target;
   const double reached = -displacement.dot(out);
   Eigen::Vector3d lateral = displacement + reached * out;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feeler/execution/contact/force_budget.h"
+
 namespace feeler::execution {
 namespace {
 
@@ -80,6 +82,7 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   move.duration_s = now_s - last_motion_end_s_;
   last_motion_end_s_ = now_s;
   record_.peak_force_n = std::max(record_.peak_force_n, move.peak_force_n);
+  if (move.peak_force_n > options_.force_budget_n) ++record_.budget_passings;
   record_.path_length_m += (report.end - before).norm() * frame_.cell_m;
   record_.moves.push_back(std::move(move));
 
@@ -111,7 +114,7 @@ MotionReport Mover::Probe(Direction direction, double coordinate, const std::str
   GuardedMotion motion;
   motion.direction = frame_.DirectionInWorld(direction);
   motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
-  motion.speed_m_s = options_.probe_speed_m_s;
+  motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedInto(UnitVector(direction)));
   motion.contact_force_n = options_.contact_force_n;
   const MotionReport report = Finish(robot_.Guarded(motion), target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
@@ -125,12 +128,21 @@ void Mover::Retreat(const Eigen::Vector3d& target) {
   robot_.ZeroWrench();
 }
 
-MotionReport Mover::Insert(const Eigen::Vector3d& target) {
+double Mover::SpeedInto(const Eigen::Vector3d& direction) const {
+  const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
+  return SpeedWithinBudget(robot_.Contact(in_world), options_.force_budget_n);
+}
+
+MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s, bool rests) {
   CheckLimits();
   CompliantMotion motion;
   motion.world_T_tool = {frame_.ToWorld(target)};
   motion.speed_m_s = options_.insertion_speed_m_s;
-  motion.force_limit_n = options_.insertion_force_limit_n;
+  const Eigen::Vector3d way = target - position_;
+  if (!way.isZero()) motion.speed_m_s = std::min(motion.speed_m_s, SpeedInto(way.normalized()));
+  if (speed_m_s) motion.speed_m_s = *speed_m_s;
+  if (!rests) motion.rest_time_s = 0.0;
+  motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);
 }
 
@@ -139,7 +151,7 @@ MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double
   CompliantMotion motion;
   for (const Eigen::Vector3d& place : way_points) motion.world_T_tool.push_back(frame_.ToWorld(place));
   motion.speed_m_s = speed_m_s;
-  motion.force_limit_n = options_.insertion_force_limit_n;
+  motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
   const MotionReport report = Finish(robot_.Compliant(motion), way_points.back(), kind, {}, false);
   position_ = report.end;  // what it is pressed against, not the command, says where it is
   return report;

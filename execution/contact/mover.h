@@ -58,8 +58,11 @@ class Mover {
   MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted);
   /// Off a wall: contacts are expected to end, not watched for. Then takes the wrench as zero.
   void Retreat(const Eigen::Vector3d& target);
-  /// Compliantly from here straight to `target`.
-  MotionReport Insert(const Eigen::Vector3d& target);
+  /// Compliantly from here straight to `target`, at the speed of an insertion or `speed_m_s`, until the tool rests or,
+  /// where it goes on at once, until it should be there.
+  MotionReport Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s = {}, bool rests = true);
+  /// How fast the tool may meet a wall in this direction (unit vector, lattice axes) as it stands, m/s.
+  double SpeedInto(const Eigen::Vector3d& direction) const;
   /// Compliantly through way points, pressing on what is under the tool.
   MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
   /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".

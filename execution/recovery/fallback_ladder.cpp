@@ -20,8 +20,9 @@
 namespace feeler::execution {
 namespace {
 
-/// How far outside the start belief a truth is looked for, m.
-constexpr double kBeyond_m = 0.0055;
+/// How far outside the start belief a truth is looked for, per axis: this much of the largest uncertainty that the task
+/// knows. What estimates where targets are is wrong by more than it says in proportion to what it says.
+constexpr double kBeyondUncertainty = 0.25;
 /// A refit with axes wider than this, to both sides, needs a plan; below, the confirming touches find it.
 constexpr double kNarrow_m = 0.004;
 constexpr int kRetries = 2;
@@ -30,10 +31,25 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kSmallestTurn_rad = 0.2 * kDegree;
 /// More than a confirming touch tells; a target that is turned farther was not the one that was felt.
 constexpr double kLargestTurn_rad = 8.0 * kDegree;
-constexpr double kSweep_rad[] = {1.0 * kDegree,  -1.0 * kDegree, 2.0 * kDegree,
-                                 -2.0 * kDegree, 3.0 * kDegree,  -3.0 * kDegree};
+/// Turns that are tried lie this many tolerances apart: each catches what is within one of it, and a little overlaps.
+constexpr double kSweepStep = 1.5;
+/// Beyond this a turn shows in the readings.
+constexpr double kSweepMost_rad = 6.0 * kDegree;
+/// Of a start belief along an axis, as problems are made for.
+constexpr int kMostCells = 64;
 /// The tool comes off the mouth by this before it goes elsewhere, cells.
 constexpr double kOff = 1.5;
+
+/// Cells beyond the start belief that are looked at, along each axis.
+Cell CellsBeyond(const Task& task) {
+  const Cell largest = LargestPositionExtents(task);
+  Cell beyond;
+  for (int axis = 0; axis < 3; ++axis) {
+    beyond[axis] = largest[axis] > 1 ? static_cast<int>(std::ceil(kBeyondUncertainty * largest[axis])) : 0;
+  }
+  // An axis that counts as certain is off by a little of what the others are.
+  return beyond.cwiseMax(1);
+}
 
 void Log(const Episode& episode, const char* rung, std::string reason) {
   episode.record.ladder.push_back({rung, std::move(reason)});
@@ -68,7 +84,7 @@ void Refit(const Episode& episode, const planner::Problem& problem, Attempt& att
   if (attempt.evidence.empty()) return;
   const Task& task = episode.task;
   Log(episode, rung::kRefit, attempt.reason);
-  const Eigen::Vector3d beyond = Eigen::Vector3d::Constant(kBeyond_m / task.cell_m);
+  const Eigen::Vector3d beyond = CellsBeyond(task).cast<double>();
   const Region region{attempt.possible.lower - beyond, attempt.possible.upper + beyond};
   const TargetFit fit = FitTargetAnywhere(*problem.map, attempt.evidence, region.lower, region.upper,
                                           attempt.orientation, episode.options.fit);
@@ -152,8 +168,9 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
 
 void SweepYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
   Log(episode, rung::kYawSweep, attempt.reason);
-  for (const double yaw_rad : kSweep_rad) {
-    if (InsertTurned(episode, problem, yaw_rad, attempt)) return;
+  const double step_rad = kSweepStep * episode.task.tolerance.angle_rad;
+  for (double yaw_rad = step_rad; yaw_rad < kSweepMost_rad; yaw_rad += step_rad) {
+    if (InsertTurned(episode, problem, yaw_rad, attempt) || InsertTurned(episode, problem, -yaw_rad, attempt)) return;
   }
 }
 
@@ -233,8 +250,7 @@ planner::Extents WithMargin(const Task& task, const planner::Problem& problem) {
     least = least.cwiseMin(h.offset);
     most = most.cwiseMax(h.offset);
   }
-  const int margin = static_cast<int>(std::ceil(0.004 / task.cell_m));
-  const Cell size = most - least + Cell::Ones() + Cell::Constant(2 * margin);
+  const Cell size = (most - least + Cell::Ones() + 2 * CellsBeyond(task)).cwiseMin(kMostCells);
   return {size.x(), size.y(), size.z()};
 }
 

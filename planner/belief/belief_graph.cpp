@@ -135,13 +135,13 @@ void BeliefGraph::Expand(BeliefId b) {
             only_bump = true;  // a known wall: nothing changes
             return;
           }
-          contact_cost += sets_.info(set).weight * cost.Of({cells, true});
+          contact_cost += sets_.info(set).weight * cost.Of({cells, true}, d);
           const BeliefId next = successor(cells, set, shift);
           if (next != kNoBelief) contacts_.push_back(next);
         },
         [&](int cells, SetId set, const Cell& shift) {
           BeliefAction action;
-          action.cost = contact_cost + sets_.info(set).weight * cost.Of({cells, false});
+          action.cost = contact_cost + sets_.info(set).weight * cost.Of({cells, false}, d);
           action.free = successor(cells, set, shift);
           action.first_contact = first_contact;
           action.contacts = static_cast<std::uint16_t>(contacts_.size() - first_contact);

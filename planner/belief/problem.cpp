@@ -69,6 +69,10 @@ void Validate(const Problem& problem) {
       throw InputError(where, fmt::format("cost {}", cost), "costs are finite and not negative");
     }
   }
+  const auto& beyond = problem.cost.beyond_per_cell;
+  if (!std::ranges::all_of(beyond, [](double cost) { return std::isfinite(cost) && cost >= 0.0; })) {
+    throw InputError(where, "costs per cell that are below the least of them", "costs are finite and not negative");
+  }
   if (problem.cost.per_cell + problem.cost.per_action <= 0.0) {
     throw InputError(where, "moves cost nothing", "give a cost per cell or per action");
   }

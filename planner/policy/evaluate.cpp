@@ -26,7 +26,7 @@ PolicyEvaluation Evaluate(const Problem& problem, const PolicyGraph& policy) {
     for (const ExpandedBranch& branch : node.outcomes) {
       const auto next = static_cast<std::size_t>(branch.next);
       const double probability = nodes[next].probability;
-      cost_so_far[next] = cost_so_far[i] + problem.cost.Of(branch.outcome);
+      cost_so_far[next] = cost_so_far[i] + problem.cost.Of(branch.outcome, node.move.direction);
       evaluation.expected_moves += probability;
       evaluation.expected_contacts += branch.outcome.contact ? probability : 0.0;
       evaluation.expected_cells += probability * branch.outcome.cells;

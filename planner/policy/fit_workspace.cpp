@@ -12,7 +12,8 @@ namespace {
 double CostToGo(const PolicyGraph& policy, const PolicyNode& node, const CostWeights& cost) {
   double expected = 0.0;
   for (const PolicyBranch& branch : node.branches) {
-    expected += branch.probability * (cost.Of(branch.outcome) + policy.nodes[branch.next].expected_cost);
+    expected +=
+        branch.probability * (cost.Of(branch.outcome, node.move.direction) + policy.nodes[branch.next].expected_cost);
   }
   return expected;
 }

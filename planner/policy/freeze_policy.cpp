@@ -57,8 +57,8 @@ class Freezer {
         branch.next = outcome.next == kNoBelief ? LeafNode(outcome.set, Cell::Zero()) : index_.at(outcome.next);
         const Cell shift = b == root ? Cell(outcome.shift + root_frame) : outcome.shift;
         branch.shift = shift;
-        node.expected_cost +=
-            branch.probability * (graph_.problem().cost.Of(outcome.outcome) + policy_.nodes[branch.next].expected_cost);
+        node.expected_cost += branch.probability * (graph_.problem().cost.Of(outcome.outcome, node.move.direction) +
+                                                    policy_.nodes[branch.next].expected_cost);
         node.branches.push_back(branch);
       }
       index_[b] = static_cast<std::uint32_t>(policy_.nodes.size());

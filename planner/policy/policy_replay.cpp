@@ -128,7 +128,7 @@ class Replayer {
     std::vector<ExpandedNode>& nodes = replay_.tree.nodes;
     for (std::size_t i = nodes.size(); i-- > 0;) {
       for (const ExpandedBranch& branch : nodes[i].outcomes) {
-        nodes[i].expected_cost += branch.probability * (problem_.cost.Of(branch.outcome) +
+        nodes[i].expected_cost += branch.probability * (problem_.cost.Of(branch.outcome, nodes[i].move.direction) +
                                                         nodes[static_cast<std::size_t>(branch.next)].expected_cost);
       }
     }

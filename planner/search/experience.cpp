@@ -40,7 +40,7 @@ class Builder {
     ExperienceMdp::Transition transition{move, 0.0, {}};
     for (const BeliefOutcome& outcome : outcomes) {
       const double probability = outcome.weight / graph_.Weight(b);
-      transition.cost += probability * graph_.problem().cost.Of(outcome.outcome);
+      transition.cost += probability * graph_.problem().cost.Of(outcome.outcome, move.direction);
       if (outcome.next != kNoBelief) transition.branches.emplace_back(Entry(outcome.next), probability);
     }
     mdp_.entries[entry].transitions.push_back(std::move(transition));

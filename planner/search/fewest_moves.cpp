@@ -64,7 +64,7 @@ class Straightener {
       double value = 0.0;
       if (!successors_done) stack.emplace_back(b, true);
       for (const BeliefOutcome& outcome : graph_.Outcomes(b, move)) {
-        value += outcome.weight * graph_.problem().cost.Of(outcome.outcome);
+        value += outcome.weight * graph_.problem().cost.Of(outcome.outcome, move.direction);
         if (outcome.next == kNoBelief) continue;
         if (successors_done) {
           value += known_.at(outcome.next).value;
@@ -116,7 +116,8 @@ class Straightener {
     assert(here == end);
     double value = known_.at(end).value;
     for (auto step = path.rbegin(); step != path.rend(); ++step) {
-      value += graph_.Weight(step->first) * graph_.problem().cost.Of({step->second.cells, false});
+      value +=
+          graph_.Weight(step->first) * graph_.problem().cost.Of({step->second.cells, false}, step->second.direction);
       const auto [at, added] = known_.try_emplace(step->first);
       if (added || value < at->second.value) at->second = {step->second, value, at->second.moves};
     }
@@ -166,7 +167,7 @@ class Straightener {
     double moves = graph_.Weight(b);
     const std::vector<BeliefOutcome> outcomes = graph_.Outcomes(b, move);
     for (const BeliefOutcome& outcome : outcomes) {
-      value += outcome.weight * graph_.problem().cost.Of(outcome.outcome);
+      value += outcome.weight * graph_.problem().cost.Of(outcome.outcome, move.direction);
       if (outcome.next == kNoBelief) continue;
       const auto at = known_.find(outcome.next);
       if (at == known_.end() || outcome.next == b || at->second.moves == std::numeric_limits<double>::infinity())

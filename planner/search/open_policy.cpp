@@ -86,7 +86,7 @@ double OpenPolicy::Record(BeliefId b, const GuardedMove& move, const std::vector
   if (action < 0) return kInfinity;
   double value = 0.0;
   for (const BeliefOutcome& outcome : outcomes) {
-    value += outcome.weight * graph_.problem().cost.Of(outcome.outcome);
+    value += outcome.weight * graph_.problem().cost.Of(outcome.outcome, move.direction);
     if (outcome.next != kNoBelief) value += Solved(outcome.next) ? Value(outcome.next) : kInfinity;
   }
   if (b >= nodes_.size()) nodes_.resize(std::max<std::size_t>(graph_.size(), b + std::size_t{1}));
@@ -150,7 +150,7 @@ double OpenPolicy::Find(BeliefId b, bool tours) {
     if (outcomes.front().next == b) continue;  // a bump: the move was for the filled map only
     if (outcomes.size() == 1 && move != planned) {
       // Part of the way. From there the plan must be as good, or ties would lead to and fro.
-      const double way = outcomes.front().weight * graph_.problem().cost.Of(outcomes.front().outcome);
+      const double way = outcomes.front().weight * graph_.problem().cost.Of(outcomes.front().outcome, move.direction);
       if (way + FilledValue(outcomes.front().next) > estimate * (1.0 + 1e-9)) continue;
     }
     for (const BeliefOutcome& outcome : outcomes) {
@@ -273,7 +273,7 @@ std::optional<OpenPolicy::Exit> OpenPolicy::BestExit(const Walk& walk) {
   const auto spend_to = [&](std::size_t end) {
     for (; stop < end; ++stop) {
       for (const BeliefOutcome& outcome : graph_.Outcomes(walk.stops[stop].belief, walk.stops[stop].move)) {
-        spent += outcome.weight * graph_.problem().cost.Of(outcome.outcome);
+        spent += outcome.weight * graph_.problem().cost.Of(outcome.outcome, walk.stops[stop].move.direction);
       }
     }
   };

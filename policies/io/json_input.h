@@ -40,6 +40,7 @@ class JsonField {
   int Integer(int min, int max) const;
   /// Throws unless it is a finite number >= min.
   double Number(double min) const;
+  bool IsList() const { return value_.is_array(); }
   bool Boolean() const;
   std::string Text() const;
   /// A list of three whole numbers.

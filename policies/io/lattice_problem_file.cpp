@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <tuple>
@@ -77,9 +78,17 @@ std::vector<int> ReadMoveLengths(const JsonField& list) {
 CostWeights ReadCost(const JsonField& object) {
   object.RequireKeys({}, {"per_cell", "per_contact", "per_action"});
   CostWeights cost;
-  if (object.Has("per_cell")) cost.per_cell = object["per_cell"].Number(0.0);
   if (object.Has("per_contact")) cost.per_contact = object["per_contact"].Number(0.0);
   if (object.Has("per_action")) cost.per_action = object["per_action"].Number(0.0);
+  if (object.Has("per_cell") && object["per_cell"].IsList()) {
+    const JsonField list = object["per_cell"];
+    list.ListSize(3, 3);
+    std::array<double, 3> per_cell{};
+    for (std::size_t axis = 0; axis < 3; ++axis) per_cell[axis] = list[axis].Number(0.0);
+    cost = CostPerAxis(per_cell, cost.per_contact, cost.per_action);
+  } else if (object.Has("per_cell")) {
+    cost.per_cell = object["per_cell"].Number(0.0);
+  }
   if (cost.per_cell + cost.per_action <= 0.0) object.Fail("makes moves free", "set per_cell or per_action above 0");
   return cost;
 }
@@ -188,9 +197,9 @@ std::string FormatLatticeProblem(const LatticeProblemData& data) {
         return json::array({h.offset.x(), h.offset.y(), h.offset.z(), h.weight});
       }));
   add("move_lengths", json(data.move_lengths).dump());
-  add("cost", json{{"per_cell", data.cost.per_cell},
-                   {"per_contact", data.cost.per_contact},
-                   {"per_action", data.cost.per_action}}
+  json per_cell = data.cost.per_cell;
+  if (!data.cost.one_per_cell()) per_cell = {data.cost.PerCell(0), data.cost.PerCell(1), data.cost.PerCell(2)};
+  add("cost", json{{"per_cell", per_cell}, {"per_contact", data.cost.per_contact}, {"per_action", data.cost.per_action}}
                   .dump());
   if (data.goal == GoalKind::kInsertable) {
     add("goal", "\"insertable\"");

@@ -166,8 +166,8 @@ planner::PolicyGraph ToPolicy(const PolicyFile& file, const planner::Problem& pr
     for (const planner::PolicyBranch& branch : node.branches) weight[i] += weight[branch.next];
     for (planner::PolicyBranch& branch : node.branches) {
       branch.probability = weight[branch.next] / weight[i];
-      node.expected_cost +=
-          branch.probability * (problem.cost.Of(branch.outcome) + policy.nodes[branch.next].expected_cost);
+      node.expected_cost += branch.probability * (problem.cost.Of(branch.outcome, node.move.direction) +
+                                                  policy.nodes[branch.next].expected_cost);
     }
   }
   policy.expected_cost = policy.nodes[policy.root].expected_cost;

@@ -176,8 +176,8 @@ double CostBound(const Problem& problem, const PomdpModel& model) {
   const std::size_t count = problem.hypotheses.size();
   double longest_move = 0.0;
   for (const GuardedMove& move : model.moves) {
-    longest_move =
-        std::max({longest_move, problem.cost.Of({move.cells, false}), problem.cost.Of({move.cells - 1, true})});
+    longest_move = std::max({longest_move, problem.cost.Of({move.cells, false}, move.direction),
+                             problem.cost.Of({move.cells - 1, true}, move.direction)});
   }
   double worst_pair = 0.0;
   for (std::size_t a = 0; a < count; ++a) {
@@ -226,7 +226,7 @@ PomdpModel MakePomdpModel(const Problem& problem, double upper_bound, std::size_
           const Outcome outcome = planner::Simulate(problem, cell, move, h);
           const auto next = index.find(CellKey(cell + outcome.cells * UnitCell(move.direction)));
           // A cell that is free under h and yet never reached under it may lead out of the listed ones.
-          if (next != index.end()) step = {next->second, problem.cost.Of(outcome)};
+          if (next != index.end()) step = {next->second, problem.cost.Of(outcome, move.direction)};
         }
         model.steps.push_back(step);
       }

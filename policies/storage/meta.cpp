@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -31,7 +32,15 @@ std::vector<AxisKind> ParseAxes(const std::string& text, const std::string& path
 }
 
 json CostJson(const CostWeights& cost) {
-  return {{"per_cell", cost.per_cell}, {"per_contact", cost.per_contact}, {"per_action", cost.per_action}};
+  json per_cell = cost.per_cell;
+  if (!cost.one_per_cell()) per_cell = {cost.PerCell(0), cost.PerCell(1), cost.PerCell(2)};
+  return {{"per_cell", per_cell}, {"per_contact", cost.per_contact}, {"per_action", cost.per_action}};
+}
+
+CostWeights CostFrom(const json& cost) {
+  const json& per_cell = cost.at("per_cell");
+  if (!per_cell.is_array()) return {per_cell.get<double>(), cost.at("per_contact"), cost.at("per_action")};
+  return CostPerAxis(per_cell.get<std::array<double, 3>>(), cost.at("per_contact"), cost.at("per_action"));
 }
 
 }  // namespace
@@ -83,13 +92,8 @@ Meta ToMeta(const DatabaseIdentity& identity) {
 DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
   try {
     const json cost = json::parse(meta.at("cost"));
-    DatabaseIdentity identity{meta.at("task"),
-                              meta.at("fingerprint"),
-                              meta.at("opening"),
-                              meta.at("goal"),
-                              {cost.at("per_cell"), cost.at("per_contact"), cost.at("per_action")},
-                              meta.at("settings"),
-                              meta.at("created_by")};
+    DatabaseIdentity identity{meta.at("task"), meta.at("fingerprint"), meta.at("opening"),   meta.at("goal"),
+                              CostFrom(cost),  meta.at("settings"),    meta.at("created_by")};
     const auto axes = meta.find(kMetaAxes);
     if (axes != meta.end()) identity.axes = ParseAxes(axes->second, path);
     return identity;

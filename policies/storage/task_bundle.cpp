@@ -103,6 +103,8 @@ json TaskJson(const Task& task) {
           {"insertion_depth_m", task.insertion_depth_m},
           {"tolerance", {task.tolerance.lateral_m, task.tolerance.vertical_m, task.tolerance.angle_rad}},
           {"cost", {task.cost.per_cell, task.cost.per_contact, task.cost.per_action}},
+          {"beyond_per_cell", task.cost.beyond_per_cell},
+          {"force_budget_n", task.force_budget_n},
           {"times", {times.transfer_speed_m_s, times.probe_speed_m_s, times.time_per_move_s, times.time_per_contact_s}},
           {"goal", ToString(task.goal)},
           {"move_lengths", task.move_lengths},
@@ -137,6 +139,10 @@ Task TaskFrom(const json& item) {
   task.tolerance = {tolerance.x(), tolerance.y(), tolerance.z()};
   const Eigen::Vector3d cost = VectorOf(item.at("cost"));
   task.cost = {cost.x(), cost.y(), cost.z()};
+  if (item.contains("beyond_per_cell")) {  // bundles of old have one cost per cell, and no budget
+    task.cost.beyond_per_cell = item.at("beyond_per_cell").get<std::array<double, 3>>();
+    task.force_budget_n = item.at("force_budget_n").get<double>();
+  }
   const json& times = item.at("times");
   task.times = {times.at(0).get<double>(), times.at(1).get<double>(), times.at(2).get<double>(),
                 times.at(3).get<double>()};

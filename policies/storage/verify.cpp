@@ -21,7 +21,8 @@ std::string FindCostFault(const planner::PolicyGraph& policy, const CostWeights&
     const planner::PolicyNode& node = policy.nodes[i];
     double expected = 0.0;
     for (const planner::PolicyBranch& branch : node.branches) {
-      expected += branch.probability * (cost.Of(branch.outcome) + policy.nodes[branch.next].expected_cost);
+      expected +=
+          branch.probability * (cost.Of(branch.outcome, node.move.direction) + policy.nodes[branch.next].expected_cost);
     }
     if (!Agree(node.expected_cost, expected)) {
       return fmt::format("node {} stores cost {:.12g}, its branches give {:.12g}", i, node.expected_cost, expected);

@@ -44,7 +44,7 @@ KinematicWalk Walk(const planner::Problem& problem, Policy& policy, const Hypoth
       return walk;
     }
     const Outcome outcome = planner::Simulate(problem, belief.robot, *move, truth);
-    walk.cost += problem.cost.Of(outcome);
+    walk.cost += problem.cost.Of(outcome, move->direction);
     walk.cells += outcome.cells;
     walk.contacts += outcome.contact ? 1 : 0;
     ++walk.moves;

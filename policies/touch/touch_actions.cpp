@@ -162,13 +162,13 @@ bool TouchActions::Evaluate(const Belief& belief, planner::OutcomeModel& outcome
 
   value = {};
   const CostWeights& cost = problem_.cost;
-  for (const GuardedMove& leg : action.approach) value.cost += cost.Of({leg.cells, false});
+  for (const GuardedMove& leg : action.approach) value.cost += cost.Of({leg.cells, false}, leg.direction);
   const auto add = [&](double weight, const Outcome& outcome) {
     if (weight <= 0.0) return;
     const double probability = weight / total;
     value.information_gain -= probability * std::log(probability);
     value.pruned += probability * (1.0 - probability);
-    value.cost += probability * cost.Of(outcome);
+    value.cost += probability * cost.Of(outcome, action.probe.direction);
   };
   for (int cells = 0; cells <= farthest; ++cells) add(contact[static_cast<std::size_t>(cells)], {cells, true});
   const double free = total - touching;

@@ -160,7 +160,7 @@ class BruteForce {
         for (const auto& [key, members] : groups) {
           const Outcome outcome{key.first, key.second};
           const double probability = Weight(members) / Weight(belief.members);
-          action.cost += probability * data_.cost.Of(outcome);
+          action.cost += probability * data_.cost.Of(outcome, d);
           action.branches.push_back({outcome, Find({Array(robot + key.first * UnitCell(d)), members}), probability});
         }
         actions_[static_cast<std::size_t>(b)].push_back(action);

@@ -43,6 +43,7 @@ TEST_P(Optimality, SolversKeepTheirPromises) {
   options.weights = (kind & 2) != 0;
   options.costs = (kind & 4) != 0;
   options.insertable = (kind & 8) != 0;
+  options.axis_costs = (kind & 16) != 0;
   int localizable = 0;
   for (std::uint64_t index = 0; index < 25; ++index) {
     const LatticeProblemData data = RandomProblem(static_cast<std::uint64_t>(kind), index, options);
@@ -75,6 +76,7 @@ TEST_P(Optimality, SolversKeepTheirPromises) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Optimality, ::testing::Range(0, 16));
+INSTANTIATE_TEST_SUITE_P(CostsPerAxis, Optimality, ::testing::Values(16, 21, 28));
 
 }  // namespace
 }  // namespace feeler::planner

@@ -126,7 +126,7 @@ class ValueIteration {
         Action action;
         for (const auto& [key, members] : groups) {
           const double probability = Weight(members) / Weight(belief.members);
-          action.cost += probability * problem_.cost.Of({key.first, key.second});
+          action.cost += probability * problem_.cost.Of({key.first, key.second}, d);
           const Cell at = robot + key.first * UnitCell(d);
           action.branches.emplace_back(probability, Find({{at.x(), at.y(), at.z()}, members}));
         }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <set>
 #include <string>
 #include <tuple>
@@ -15,6 +16,7 @@ struct RandomProblemOptions {
   bool three_d = false;
   bool weights = false;     ///< a prior that is not uniform
   bool costs = false;       ///< costs per contact and per action
+  bool axis_costs = false;  ///< another cost per cell along each axis
   bool insertable = false;  ///< goal insertable with a spread of one cell
   int most_hypotheses = 5;
 };
@@ -68,6 +70,11 @@ inline LatticeProblemData RandomProblem(std::uint64_t seed, std::uint64_t index,
                       Draw(random, 0, data.size.z() - 1));
     data.move_lengths = random.Uniform() < 0.5 ? std::vector<int>{1, 2, 4} : std::vector<int>{1, 3};
     if (options.costs) data.cost = {random.Uniform(0.2, 2.0), random.Uniform(0.0, 3.0), random.Uniform(0.0, 3.0)};
+    if (options.axis_costs) {
+      std::array<double, 3> per_cell{};
+      for (double& value : per_cell) value = random.Uniform(0.2, 4.0);
+      data.cost = CostPerAxis(per_cell, data.cost.per_contact, data.cost.per_action);
+    }
     if (options.insertable) {
       data.goal = GoalKind::kInsertable;
       data.insertable_spread = Cell(1, 1, 0);

@@ -110,7 +110,8 @@ class BruteForce {
         double weight = 0.0, cost = 0.0;
         for (const Group& group : groups) {
           const Cell next = r + group.outcome.cells * UnitCell(move.direction);
-          cost += group.weight * (problem_.cost.Of(group.outcome) + Solve(group.members)[CellIndex(next)].cost);
+          cost += group.weight *
+                  (problem_.cost.Of(group.outcome, move.direction) + Solve(group.members)[CellIndex(next)].cost);
           weight += group.weight;
         }
         if (cost / weight < best[i].cost) best[i] = {cost / weight, move};
@@ -125,7 +126,7 @@ class BruteForce {
           const std::vector<Group> groups = Split(r, move, subset);
           if (groups.size() != 1 || groups[0].outcome.cells == 0) return;
           const Cell next = r + groups[0].outcome.cells * UnitCell(move.direction);
-          const double cost = problem_.cost.Of(groups[0].outcome) + best[CellIndex(next)].cost;
+          const double cost = problem_.cost.Of(groups[0].outcome, move.direction) + best[CellIndex(next)].cost;
           if (cost < best[i].cost - 1e-12) best[i] = {cost, move}, changed = true;
         });
       }
@@ -153,7 +154,8 @@ class BruteForce {
         const std::uint32_t child = MakeNode(policy, made, group.members, next);
         node.branches.push_back({group.outcome, child, Cell::Zero(), group.weight / weight});
         node.expected_cost +=
-            group.weight / weight * (problem_.cost.Of(group.outcome) + policy.nodes[child].expected_cost);
+            group.weight / weight *
+            (problem_.cost.Of(group.outcome, node.move.direction) + policy.nodes[child].expected_cost);
       }
     }
     policy.nodes[index] = std::move(node);

@@ -1,6 +1,10 @@
 #include "feeler/workflow/episode/episode.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "feeler/core/clock.h"
@@ -28,7 +32,30 @@ class Watched {
   env::SimulatedRobot& robot_;
 };
 
+/// Of the tool, as the scene has it.
+double SlidingFriction(const env::Scene& scene) {
+  return scene.tool_geoms.empty() ? 1.0 : scene.model->geom_friction[3 * scene.tool_geoms.front()];
+}
+
+/// How far the target is turned against its estimate, rad.
+double YawOfFault(const Task& task, const EpisodeDraw& draw) {
+  return InsertionAngle(task, draw.world_T_estimate.linear().transpose() * draw.world_T_true.linear());
+}
+
 }  // namespace
+
+double ForceBudget(const Task& task, const EpisodeFaults& faults, const std::optional<double>& wanted_n) {
+  constexpr double kAboveThreshold = 1.2;
+  const double least_n = kAboveThreshold * faults.robot.contact_threshold_n;
+  if (!wanted_n) return std::max(task.force_budget_n, least_n);
+  if (!std::isfinite(*wanted_n) || *wanted_n < least_n) {
+    throw InputError("force budget",
+                     fmt::format("{} N, and with noise '{}' a contact is told from {:g} N on", *wanted_n, faults.name,
+                                 faults.robot.contact_threshold_n),
+                     fmt::format("give {:g} N or more", least_n));
+  }
+  return *wanted_n;
+}
 
 std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
   return std::make_shared<const env::Scene>(env::BuildScene(setup.model));
@@ -39,7 +66,8 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
     : setup_(std::move(setup)),
       policy_factory_(std::move(policy_factory)),
       options_(std::move(options)),
-      noise_(ParseFaults(options_.noise)) {
+      noise_(ParseFaults(options_.noise)),
+      force_budget_n_(ForceBudget(setup_->task(), noise_, options_.force_budget_n)) {
   if (noise_.oversize_m > 0.0) {
     scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
   }
@@ -111,7 +139,12 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   reset.world_T_estimate = draw.world_T_estimate;
   reset.world_T_target = draw.world_T_true;
   reset.extents = AxisExtents(task, draw.extents);
-  reset.noise = noise_.robot;
+  const env::Scene& world = environment_->robot().world().scene();
+  WorldDraw world_draw = DrawWorld(task, noise_, SlidingFriction(world), options_.seed, episode);
+  reset.noise = world_draw.robot;
+  reset.physics = world_draw.physics;
+  record.fault_values = world_draw.values;
+  if (noise_.yaw_error_rad > 0.0) record.fault_values["yaw"] = YawOfFault(task, draw) * 180.0 / std::numbers::pi;
   reset.start = env::StartPlace::kHome;
   reset.withhold_true_pose = options_.withhold_true_pose;
   environment_->Reset(options_.seed, reset);
@@ -135,6 +168,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options = execution::ExecutorOptions::WithFriction();
       options.contact_force_n = reset.noise.contact_threshold_n;
     }
+    options.force_budget_n = force_budget_n_;
     options.ladder = options_.ladder;
     options.online_planner = online_planner_;
     if (setup_->map->orientations() > 1) {
@@ -161,6 +195,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   record.lateral_m = verdict.lateral_m;
   const env::RobotStatistics& statistics = environment_->robot().statistics();
   record.peak_force_n = statistics.peak_force_n;
+  record.execution.force_budget_n = force_budget_n_;
   record.impulse_ns = statistics.impulse_ns;
   record.forbidden_contacts = statistics.forbidden_contacts;
   if (record.inserted) {

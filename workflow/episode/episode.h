@@ -33,11 +33,18 @@ struct EpisodeOptions {
   bool ladder = true;                         ///< fallbacks when the policy does not come to an insertion
   /// How well the position across the insertion must be known before the insertion; default: the executor's.
   std::optional<double> confirm_limit_m;
+  /// What no contact is to push harder than while the tool feels, N; default: as ForceBudget says.
+  std::optional<double> force_budget_n;
   /// Keep what the episode looked like in its record. Not for a robot that somebody else observes.
   bool replay = false;
   /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
   bool withhold_true_pose = false;
 };
+
+/// The force budget of episodes with those faults, N: the one that is wanted, or the task's, or what the noise of the
+/// force sensor asks for where that is more (a contact must be told from noise before the budget is used up). Throws
+/// InputError for a wanted one below that.
+double ForceBudget(const Task& task, const EpisodeFaults& faults, const std::optional<double>& wanted_n);
 
 /// The world of the task's episodes: robot, tool, target, fixtures.
 std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup);
@@ -60,6 +67,7 @@ class EpisodeRunner {
   PolicyFactory policy_factory_;
   EpisodeOptions options_;
   EpisodeFaults noise_;
+  double force_budget_n_;
   std::shared_ptr<execution::OnlinePlanner> online_planner_;
   std::unique_ptr<env::InsertionEnv> environment_;
   std::unique_ptr<PlacementSampler> placements_;  ///< if the target is placed in the workspace

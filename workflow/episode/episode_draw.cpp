@@ -1,6 +1,9 @@
 #include "feeler/workflow/episode/episode_draw.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <string>
 
 #include "feeler/core/error.h"
 #include "feeler/core/random.h"
@@ -53,6 +56,34 @@ EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, 
     MoveOutside(task, draw.extents, noise, outside, draw);
   }
   draw.world_T_true = TurnedByFault(task, noise, seed, episode, draw.world_T_true);
+  return draw;
+}
+
+WorldDraw DrawWorld(const Task& task, const EpisodeFaults& faults, double friction, std::uint64_t seed,
+                    std::uint64_t episode) {
+  WorldDraw draw;
+  draw.robot = faults.robot;
+  const auto value_of = [&](const FaultRange& range, const char* name, double unit) {
+    RandomStream random(seed, episode, std::string("fault ") + name);
+    const double value = random.Uniform(range.least, range.most);
+    draw.values[name] = value / unit;
+    return value;
+  };
+  if (faults.force_noise_n) draw.robot.force_noise_n = value_of(*faults.force_noise_n, "force-noise", 1.0);
+  if (faults.latency_s) draw.robot.force_delay_s = value_of(*faults.latency_s, "latency", 1e-3);
+  if (faults.contact_friction) {
+    draw.physics.contact_friction = value_of(*faults.contact_friction, "contact-friction", 1.0) / friction;
+  }
+  if (faults.slip_m) {
+    constexpr double kTurn_rad_m = 2.0 * std::numbers::pi / 180.0 / 1e-3;
+    const double slip_m = value_of(*faults.slip_m, "slip", 1e-3);
+    RandomStream random(seed, episode, "direction of slip");
+    const double angle = random.Uniform(0.0, 2.0 * std::numbers::pi);
+    const int along = AxisOf(task.insertion);
+    draw.physics.tool_slip_m[(along + 1) % 3] = slip_m * std::cos(angle);
+    draw.physics.tool_slip_m[(along + 2) % 3] = slip_m * std::sin(angle);
+    draw.physics.tool_turn_rad = (random.Index(2) == 0 ? -1.0 : 1.0) * kTurn_rad_m * slip_m;
+  }
   return draw;
 }
 

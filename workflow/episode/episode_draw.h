@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "feeler/core/pose.h"
 #include "feeler/core/task.h"
+#include "feeler/env/scene/physics_variation.h"
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/workflow/episode/episode_faults.h"
 
@@ -42,6 +44,16 @@ planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t
 /// that box, or turns it; its other parts are not drawn here. Throws InputError for an empty family.
 EpisodeDraw DrawEpisode(const Task& task, const planner::ProblemFamily& family, std::uint64_t seed,
                         std::uint64_t episode, const EpisodeFaults& noise = {});
+
+/// What the ranges of the faults came to in one episode.
+struct WorldDraw {
+  env::NoiseOptions robot;
+  env::PhysicsVariation physics;
+  std::map<std::string, double> values;  ///< by name of the fault, in its unit of the command line
+};
+/// Every fault has a stream of its own. `friction`: of the contacts in the scene.
+WorldDraw DrawWorld(const Task& task, const EpisodeFaults& faults, double friction, std::uint64_t seed,
+                    std::uint64_t episode);
 
 /// The pose turned by the noise's yaw error about the insertion axis, with the sign of the episode.
 Pose TurnedByFault(const Task& task, const EpisodeFaults& noise, std::uint64_t seed, std::uint64_t episode,

@@ -36,6 +36,27 @@ void AddOutside(EpisodeFaults& noise, double least_mm, double most_mm) {
   noise.outside_most_m = 1e-3 * most_mm;
 }
 
+void SetOnce(std::optional<FaultRange>& range, const char* what, double least, double most) {
+  if (range) throw InputError("noise", std::string("two ranges of ") + what, "give one of them");
+  range = FaultRange{least, most};
+}
+
+void AddForceNoise(EpisodeFaults& n, double least_n, double most_n) {
+  SetOnce(n.force_noise_n, "force noise", least_n, most_n);
+  n.robot.force_noise_n = most_n;
+  n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 4.0 + 6.0 * most_n);
+}
+void AddLatency(EpisodeFaults& n, double least_ms, double most_ms) {
+  SetOnce(n.latency_s, "latency", 1e-3 * least_ms, 1e-3 * most_ms);
+  n.robot.force_delay_s = 1e-3 * most_ms;
+}
+void AddContactFriction(EpisodeFaults& n, double least, double most) {
+  SetOnce(n.contact_friction, "contact friction", least, most);
+}
+void AddSlip(EpisodeFaults& n, double least_mm, double most_mm) {
+  SetOnce(n.slip_m, "slip", 1e-3 * least_mm, 1e-3 * most_mm);
+}
+
 constexpr WorldNoise kWorldNoises[] = {
     {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
      [](EpisodeFaults& n) { AddOutside(n, 0.5, 4.0); }},
@@ -59,10 +80,7 @@ struct MeasuredNoise {
 
 constexpr MeasuredNoise kMeasuredNoises[] = {
     {"force-noise", "noise of the force sensor, N; contacts are told from 4 N + 6 times that on", 0.0, 50.0,
-     [](EpisodeFaults& n, double newton) {
-       n.robot.force_noise_n = newton;
-       n.robot.contact_threshold_n = std::max(n.robot.contact_threshold_n, 4.0 + 6.0 * newton);
-     }},
+     [](EpisodeFaults& n, double newton) { AddForceNoise(n, newton, newton); }},
     {"joint-friction", "friction of the large joints, Nm; the wrists have two fifths of it", 0.0, 30.0,
      [](EpisodeFaults& n, double torque_nm) {
        for (int i = 0; i < env::kJointCount; ++i) n.robot.joint_friction_nm[i] = (i < 3 ? 1.0 : 0.4) * torque_nm;
@@ -75,6 +93,12 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
      [](EpisodeFaults& n, double degrees) { AddYaw(n, degrees, degrees); }},
     {"outside", "the target stands so many mm outside the box of hypotheses on one axis", 0.0, 100.0,
      [](EpisodeFaults& n, double mm) { AddOutside(n, mm, mm); }},
+    {"latency", "forces are told so many ms late", 0.0, 50.0,
+     [](EpisodeFaults& n, double ms) { AddLatency(n, ms, ms); }},
+    {"contact-friction", "coefficient of friction of every contact", 0.0, 5.0,
+     [](EpisodeFaults& n, double friction) { AddContactFriction(n, friction, friction); }},
+    {"slip", "the tool has slipped in the gripper by so many mm across the insertion, and turned by 2 degrees a mm",
+     0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
 };
 
 /// Names with a range, "yaw=0..5": the value is drawn uniformly per episode.
@@ -85,7 +109,12 @@ struct DrawnNoise {
   void (*add)(EpisodeFaults& noise, double from, double to);
 };
 
-constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw}, {"outside", 0.0, 100.0, AddOutside}};
+constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw},
+                                       {"outside", 0.0, 100.0, AddOutside},
+                                       {"force-noise", 0.0, 50.0, AddForceNoise},
+                                       {"latency", 0.0, 50.0, AddLatency},
+                                       {"contact-friction", 0.0, 5.0, AddContactFriction},
+                                       {"slip", 0.0, 5.0, AddSlip}};
 
 bool ReadNumber(const std::string& text, double& value) {
   std::istringstream number(text);
@@ -111,7 +140,7 @@ bool AddDrawn(const std::string& text, EpisodeFaults& noise) {
     return true;
   }
   throw InputError("noise", "'" + text + "': " + name + " takes no range",
-                   "yaw and outside take one, FROM..TO; give a number");
+                   "yaw, outside, force-noise, latency, contact-friction and slip take one, FROM..TO; give a number");
 }
 
 /// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,6 +8,12 @@
 #include "feeler/env/robot/noise.h"
 
 namespace feeler::workflow {
+
+/// A value drawn uniformly per episode.
+struct FaultRange {
+  double least = 0.0;
+  double most = 0.0;
+};
 
 /// What makes the world of an episode harder than the planner thinks it is.
 struct EpisodeFaults {
@@ -23,6 +30,12 @@ struct EpisodeFaults {
   /// (uniform between the two).
   double yaw_error_rad = 0.0;
   double yaw_error_least_rad = 0.0;
+  std::optional<FaultRange> force_noise_n;     ///< the threshold of contact is that of the most
+  std::optional<FaultRange> latency_s;         ///< of the force sensor
+  std::optional<FaultRange> contact_friction;  ///< coefficient of every contact
+  /// The tool has slipped in the gripper, in any direction across the insertion, and turned by 2 degrees about it for
+  /// every mm, either way.
+  std::optional<FaultRange> slip_m;
 };
 
 struct FaultName {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,7 @@ struct EpisodeRecord {
   std::string task;
   std::string policy;
   std::string noise;
+  std::map<std::string, double> fault_values;  ///< what the faults with ranges came to, in their units
   std::uint64_t seed = 0;
   std::uint64_t episode = 0;
   std::string placement = "nominal";  ///< how the place of the target was drawn

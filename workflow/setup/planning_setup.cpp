@@ -4,6 +4,7 @@
 
 #include "feeler/env/contact/contact_map_cache.h"
 #include "feeler/env/model/fingerprint.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 
 namespace feeler::workflow {
 namespace {
@@ -38,8 +39,12 @@ PlanningSetup LoadPlanningSetup(const std::string& task, const PlanningSetupOpti
   PlanningSetup setup;
   setup.model = env::LoadTask(task);
   if (options.goal) setup.model.task.goal = *options.goal;
-  if (options.cost_kind == CostKind::kTime) setup.model.task.cost = TimeCost(setup.task());
-  if (options.cost) setup.model.task.cost = *options.cost;
+  if (options.cost) {
+    setup.model.task.cost = *options.cost;
+  } else if (options.cost_kind == CostKind::kTime) {
+    const auto speeds = NominalContactSpeeds(setup.model, setup.task().force_budget_n);
+    setup.model.task.cost = speeds ? TimeCost(setup.task(), *speeds) : TimeCost(setup.task());
+  }
   setup.cost_kind = options.cost_kind;
   setup.opening = options.opening;
   setup.map = std::make_shared<const planner::ContactMap>(

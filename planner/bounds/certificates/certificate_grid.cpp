@@ -25,17 +25,22 @@ StepCosts LowerStepCosts(const CostWeights& cost, int longest_move) {
 StepCosts MotionCosts(const CostWeights& cost, const std::vector<int>& lengths) {
   if (cost.per_cell <= 0.0) return LowerStepCosts(cost, lengths.back());
   StepCosts costs{cost.per_cell, cost.per_contact, cost.per_action, {}};
-  if (costs.start > 0.0 && lengths.back() <= GuardedWalks::kLongest) costs.lengths = lengths;
+  if (costs.start > 0.0 && lengths.back() <= GuardedWalks::kLongest) {
+    costs.lengths = lengths;
+    costs.beyond = cost.beyond_per_cell;
+  }
   return costs;
 }
 
 TableUnits::TableUnits(const StepCosts& costs) {
   const auto whole = [&](double x) { return std::fmod(x, costs.free) == 0.0; };
-  free_units = whole(costs.contact) && whole(costs.start) ? 1 : kUnitsPerStep;
+  free_units =
+      whole(costs.contact) && whole(costs.start) && std::ranges::all_of(costs.beyond, whole) ? 1 : kUnitsPerStep;
   unit = costs.free / free_units;
   const auto units = [&](double x) { return static_cast<std::uint32_t>(std::min(60000.0, std::floor(x / unit))); };
   contact_units = units(costs.contact);
   start_units = units(costs.start);
+  std::ranges::transform(costs.beyond, beyond_units.begin(), units);
 }
 
 CertificateGrid::CertificateGrid(const ActiveRegion& region, const StepCosts& costs, const Cell& reach)
@@ -69,6 +74,7 @@ void TableGuardedCertificates(const ContactMap& map, int orientation, const Cert
   walks.size = grid.size;
   walks.lengths = grid.lengths;
   walks.step_cost = grid.free_units;
+  walks.beyond_step = grid.beyond_units;
   walks.contact_cost = grid.contact_units;
   walks.action_cost = grid.start_units;
   walks.projected = true;

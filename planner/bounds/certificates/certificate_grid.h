@@ -24,6 +24,9 @@ struct StepCosts {
   double start = 0.0;
   /// Of guarded moves, where setting out costs something; none: motions of any length.
   std::vector<int> lengths = {};
+  /// What a step along each axis costs beyond `free`, where walks are made of guarded moves; elsewhere the least of the
+  /// axes stands for all of them, which is a bound too.
+  std::array<double, 3> beyond{};
 };
 StepCosts LowerStepCosts(const CostWeights& cost, int longest_move);
 /// Costs of walks made of guarded moves as they are: bounds from these are tighter than from shares wherever per_action
@@ -38,7 +41,8 @@ struct TableUnits {
   std::uint32_t free_units = 1;  ///< of a free step
   std::uint32_t contact_units = 0;
   std::uint32_t start_units = 0;
-  double unit = 1.0;  ///< cost in problem units of one unit of the tables
+  std::array<std::uint32_t, 3> beyond_units{};  ///< of a free step along each axis, on top of free_units
+  double unit = 1.0;                            ///< cost in problem units of one unit of the tables
 };
 
 /// The displacements for which certificates are tabled, and the unit of the tables. Two cells beyond all that a walk

@@ -52,9 +52,9 @@ class Filler {
     return static_cast<std::size_t>(static_cast<std::int64_t>(cell) +
                                     (end - position) * strides_[static_cast<std::size_t>(axis)]);
   }
-  std::uint32_t Cost(int steps, bool contact) const {
-    return walks_.action_cost + static_cast<std::uint32_t>(steps) * walks_.step_cost +
-           (contact ? walks_.contact_cost : 0);
+  std::uint32_t Cost(int steps, bool contact, Direction d) const {
+    const std::uint32_t step = walks_.step_cost + walks_.beyond_step[static_cast<std::size_t>(AxisOf(d))];
+    return walks_.action_cost + static_cast<std::uint32_t>(steps) * step + (contact ? walks_.contact_cost : 0);
   }
   bool Inward(int position, Direction d) const {
     return walks_.projected && position == (SignOf(d) > 0 ? 0 : walks_.size[AxisOf(d)] - 1);
@@ -85,7 +85,7 @@ class Filler {
       if ((shows & mask) == 0) return;
       const std::uint16_t rest = planes_[(mask & ~shows) * cells_ + End(cell, position, telling.direction, steps)];
       if (rest == kNoCertificate) return;
-      values_[cell] = std::min(values_[cell], Cost(steps, travel < length) + rest);
+      values_[cell] = std::min(values_[cell], Cost(steps, travel < length, telling.direction) + rest);
     };
     if (Inward(position, telling.direction)) {
       for (int length = 1; length <= std::min(longest, travel + 1); ++length) try_move(length);
@@ -107,18 +107,18 @@ class Filler {
       if (silent > 0) {
         if (Inward(position, d)) {
           for (int n = 1; n <= silent; ++n) {
-            best = std::min(best, Cost(n, false) + values_[End(cell, position, d, n)]);
+            best = std::min(best, Cost(n, false, d) + values_[End(cell, position, d, n)]);
           }
         } else {
           for (const int n : walks_.lengths) {
             if (n > silent) break;
-            best = std::min(best, Cost(n, false) + values_[End(cell, position, d, n)]);
+            best = std::min(best, Cost(n, false, d) + values_[End(cell, position, d, n)]);
           }
         }
       }
       if (bumps_[index][cell] != 0) {
         const int n = walks_.travel[index][cell];
-        if (n > 0) best = std::min(best, Cost(n, true) + values_[End(cell, position, d, n)]);
+        if (n > 0) best = std::min(best, Cost(n, true, d) + values_[End(cell, position, d, n)]);
       }
     }
     return best;

@@ -16,6 +16,7 @@ struct GuardedWalks {
   Cell size = Cell::Ones();
   std::vector<int> lengths;  ///< of moves, ascending; at most kLongest
   std::uint32_t step_cost = 1;
+  std::array<std::uint32_t, 3> beyond_step{};  ///< of a step along x, y, z, on top of step_cost
   std::uint32_t contact_cost = 0;
   std::uint32_t action_cost = 0;
   /// The grid stands for an unbounded lattice whose outermost layers repeat: moves end at the border, and from there

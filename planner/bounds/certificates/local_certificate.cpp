@@ -62,6 +62,7 @@ void LocalCertificateTable::FillGuarded(const Problem& problem, int hypothesis, 
   walks.size = size_;
   walks.lengths = problem.move_lengths;
   walks.step_cost = units.free_units;
+  walks.beyond_step = units.beyond_units;
   walks.contact_cost = units.contact_units;
   walks.action_cost = units.start_units;
   const auto& mine = problem.hypotheses[static_cast<std::size_t>(hypothesis)];

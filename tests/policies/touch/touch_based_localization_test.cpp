@@ -72,7 +72,7 @@ class BruteForceGreedy {
       const Outcome outcome = planner::Simulate(problem_, pose, probe, h);
       groups[{outcome.cells, outcome.contact}] += h.weight;
       total += h.weight;
-      value.cost += h.weight * problem_.cost.Of(outcome);
+      value.cost += h.weight * problem_.cost.Of(outcome, probe.direction);
     }
     value.cost = approach_cost + value.cost / total;
     for (const auto& [outcome, weight] : groups) {
@@ -134,7 +134,8 @@ class BruteForceGreedy {
     double cost = 0.0;
     for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
       const int cells = (corners[i + 1] - corners[i]).cwiseAbs().sum();
-      if (cells > 0) cost += problem_.cost.Of({cells, false});
+      const Direction any = kDirections[0];  // distance: all axes cost the same
+      if (cells > 0) cost += problem_.cost.Of({cells, false}, any);
     }
     return cost;
   }
@@ -165,7 +166,7 @@ TEST_P(Greedy, EqualsBruteForceOnEveryBeliefOfAWalk) {
       for (const Hypothesis& h : belief.hypotheses) {
         ASSERT_FALSE(planner::Simulate(problem, belief.robot, leg, h).contact);
       }
-      approach_cost += problem.cost.Of({leg.cells, false});
+      approach_cost += problem.cost.Of({leg.cells, false}, leg.direction);
       belief.robot += leg.cells * UnitCell(leg.direction);
     }
     const double chosen = Score(options.criterion, brute.Value(belief, belief.robot, approach_cost, action->probe));

@@ -6,7 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
 
@@ -122,6 +125,51 @@ TEST(DrawEpisode, RangesAreFilledAndKept) {
   for (const char* bad : {"yaw=5..1", "yaw=0..x", "yaw=..3", "outside=-1..3", "stiffness=1..2", "yaw=0..99",
                           "tilt=1..2", "outside,outside=1..2", "yaw-1,yaw=1..2"}) {
     EXPECT_THROW((void)ParseFaults(bad), InputError) << bad;
+  }
+}
+
+TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
+  const Task task = ThreeAxisTask();
+  const EpisodeFaults faults = ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6");
+  EXPECT_GE(faults.robot.contact_threshold_n, 40.0) << "a contact is told from the worst noise of the range";
+  std::map<std::string, std::pair<double, double>> met;
+  for (std::uint64_t k = 0; k < 200; ++k) {
+    const WorldDraw draw = DrawWorld(task, faults, 0.3, 5, k);
+    EXPECT_EQ(draw.values, DrawWorld(task, faults, 0.3, 5, k).values);
+    EXPECT_EQ(draw.robot.force_delay_s, 1e-3 * draw.values.at("latency"));
+    EXPECT_EQ(draw.robot.force_noise_n, draw.values.at("force-noise"));
+    EXPECT_NEAR(0.3 * draw.physics.contact_friction, draw.values.at("contact-friction"), 1e-12);
+    EXPECT_NEAR(1e3 * draw.physics.tool_slip_m.norm(), draw.values.at("slip"), 1e-12);
+    EXPECT_EQ(draw.physics.tool_slip_m[AxisOf(task.insertion)], 0.0);
+    EXPECT_NEAR(std::abs(draw.physics.tool_turn_rad) * 180.0 / std::numbers::pi, 2.0 * draw.values.at("slip"), 1e-9);
+    for (const auto& [name, value] : draw.values) {
+      auto [it, first] = met.try_emplace(name, value, value);
+      it->second = {std::min(it->second.first, value), std::max(it->second.second, value)};
+    }
+    // Every fault has a stream of its own.
+    EXPECT_EQ(DrawWorld(task, ParseFaults("slip=0..1"), 0.3, 5, k).values.at("slip"), draw.values.at("slip"));
+  }
+  const std::map<std::string, std::pair<double, double>> ranges = {
+      {"latency", {2.0, 8.0}}, {"contact-friction", {0.1, 0.6}}, {"slip", {0.0, 1.0}}, {"force-noise", {1.0, 6.0}}};
+  ASSERT_EQ(met.size(), ranges.size());
+  for (const auto& [name, range] : ranges) {
+    const double width = range.second - range.first;
+    EXPECT_GE(met[name].first, range.first) << name;
+    EXPECT_LE(met[name].second, range.second) << name;
+    EXPECT_LT(met[name].first, range.first + 0.1 * width) << name;
+    EXPECT_GT(met[name].second, range.second - 0.1 * width) << name;
+  }
+}
+
+TEST(ForceBudget, IsAboveWhatTellsAContactFromNoise) {
+  Task task = ThreeAxisTask();
+  EXPECT_EQ(ForceBudget(task, ParseFaults("ideal"), {}), 25.0);
+  task.force_budget_n = 12.0;
+  EXPECT_EQ(ForceBudget(task, ParseFaults("ideal"), {}), 12.0);
+  EXPECT_EQ(ForceBudget(task, ParseFaults("ideal"), 60.0), 60.0);
+  EXPECT_NEAR(ForceBudget(task, ParseFaults("force-noise=6"), {}), 48.0, 1e-12) << "the default rises";
+  for (const double wanted_n : {47.0, 0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW((void)ForceBudget(task, ParseFaults("force-noise=6"), wanted_n), InputError) << wanted_n;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "feeler/core/error.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/planner/family/preprocess.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
 #include "tests/env/task_text.h"
 
@@ -34,6 +35,36 @@ TEST(TimeCost, FollowsTheTimesOfTheTask) {
   const CostWeights slower = TimeCost(Load(text));
   EXPECT_GT(slower.per_cell, cost.per_cell);
   EXPECT_LT(slower.per_cell, 0.002 / 0.05);
+}
+
+TEST(TimeCost, ACellAlongASlowAxisCostsMore) {
+  Task task = Load(env::TaskText());
+  ContactSpeeds speeds;
+  speeds.speed_m_s = {1.0, 1.0, 1.0};
+  EXPECT_EQ(TimeCost(task, speeds), TimeCost(task)) << "one number keeps every bit";
+  speeds.speed_m_s = {0.05, 0.06, 0.0102};
+  const CostWeights cost = TimeCost(task, speeds);
+  EXPECT_FALSE(cost.one_per_cell());
+  EXPECT_NEAR(cost.PerCell(0), TimeCost(task).per_cell, 1e-8);
+  EXPECT_NEAR(cost.PerCell(0), cost.PerCell(1), 1e-8);
+  Task slow = task;
+  slow.times.probe_speed_m_s = 0.94 * 0.0102;
+  EXPECT_NEAR(cost.PerCell(2), TimeCost(slow).per_cell, 1e-8);
+  EXPECT_EQ(CostPerAxis({cost.PerCell(0), cost.PerCell(1), cost.PerCell(2)}, cost.per_contact, cost.per_action), cost)
+      << "what a database keeps gives the same costs, bit by bit";
+}
+
+TEST(NominalContactSpeeds, ThePlugIsHardAlongItsInsertion) {
+  const env::TaskModel plug = env::LoadTask("plug");
+  const auto speeds = NominalContactSpeeds(plug, 25.0);
+  ASSERT_TRUE(speeds);
+  EXPECT_NEAR(speeds->force_per_speed_n_s_m[2], 2150.0, 300.0);
+  EXPECT_GT(speeds->speed_m_s[0], 2.0 * speeds->speed_m_s[2]) << "across it is softer";
+  EXPECT_LE(WorstPredictedForce(*speeds, 0.05), 25.0);
+  const auto twice = NominalContactSpeeds(plug, 50.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(twice->speed_m_s[axis], 2.0 * speeds->speed_m_s[axis], 2.1e-4) << axis;
+  }
 }
 
 TEST(TimeCost, WrongTimesNameTheirField) {

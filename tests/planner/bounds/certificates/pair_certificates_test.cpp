@@ -171,7 +171,7 @@ class MapOracle {
         Action action;
         for (const auto& [outcome, group] : groups) {
           const double share = static_cast<double>(group.size()) / static_cast<double>(members.size());
-          action.cost += share * problem_.cost.Of({outcome.first, outcome.second});
+          action.cost += share * problem_.cost.Of({outcome.first, outcome.second}, d);
           const Cell next = here + outcome.first * UnitCell(d);
           action.next.emplace_back(Find({{next.x(), next.y()}, group}), share);
         }

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "feeler/core/robot.h"
+
+namespace feeler::execution {
+
+/// How fast the tool may meet a wall so that no force passes a budget.
+///
+/// A mass m that meets a contact of stiffness k and damping ratio z at speed v is pushed back with at most
+/// max(1, 2 z) v sqrt(m k): an elastic contact gives v sqrt(m k) when it has taken all of the motion, a damped one its
+/// greatest force at the first touch, 2 z v sqrt(m k). Until the robot reacts, t later, it drives the tool v t deeper,
+/// which adds k v t. So the force is proportional to speed:
+///   F = v (max(1, 2 z) sqrt(m k) + k t).
+double ForcePerSpeed(const ContactResponse& contact);
+
+/// The speed (m/s) that uses kShareOfBudget of `budget_n` by that law; the rest is for what the law leaves out: the
+/// push of the controller and contacts beside the axis of the tool.
+double SpeedWithinBudget(const ContactResponse& contact, double budget_n);
+inline constexpr double kShareOfBudget = 0.85;
+
+}  // namespace feeler::execution

@@ -1,0 +1,87 @@
+// Laws of what a contact costs in force (SimulatedRobot::Contact): effective mass is that of a push along u with the
+// rotation of the tool held; the world
+// is as hard as it was: along z the plug is pushed with 2.15 N for every mm/s; and the speed that force_budget.h gives
+// a budget keeps it, in every direction and at every budget, without being so careful that most of it stays unused.
+
+#include "feeler/execution/contact/force_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "tests/env/plug_world.h"
+
+namespace feeler::env {
+namespace {
+
+struct Wall {
+  Eigen::Vector3d start_m;
+  Eigen::Vector3d direction;
+};
+
+class ContactResponseTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<const Scene> scene_ = PlugScene();
+  SimulatedRobot robot_{scene_};
+
+  void Place(const Eigen::Vector3d& displacement_m) {
+    robot_.Reset(At(*scene_, ToolAt(*scene_, displacement_m)), scene_->task.world_T_target, NoisePreset("ideal"),
+                 RandomStream(1, 0, "sensor"));
+  }
+  Eigen::Vector3d InWorld(const Eigen::Vector3d& direction) const {
+    return scene_->task.world_T_target.linear() * direction;
+  }
+  double PeakForce(const Wall& wall, double speed_m_s) {
+    Place(wall.start_m);
+    GuardedMotion motion;
+    motion.direction = InWorld(wall.direction);
+    motion.distance_m = 0.02;
+    motion.speed_m_s = speed_m_s;
+    const MotionResult result = robot_.Guarded(motion);
+    EXPECT_TRUE(result.contact);
+    EXPECT_DOUBLE_EQ(result.peak_force_n, robot_.statistics().peak_force_n);
+    return result.peak_force_n;
+  }
+  const std::vector<Wall> walls_ = {
+      {{0.02, 0.02, 0.0087}, -Eigen::Vector3d::UnitZ()},    {{-0.03, 0.003, 0.0061}, -Eigen::Vector3d::UnitZ()},
+      {{-0.0573, -0.017, -0.02}, Eigen::Vector3d::UnitX()}, {{0.0541, 0, -0.008}, -Eigen::Vector3d::UnitX()},
+      {{0.01, 0.0457, -0.01}, -Eigen::Vector3d::UnitY()},
+  };
+};
+
+TEST_F(ContactResponseTest, EffectiveMassIsThatOfInertiaAndJacobian) {
+  Place({0.01, 0.0, 0.02});
+  const Eigen::Vector3d u = Eigen::Vector3d(0.3, -0.4, 0.6).normalized();
+  const Matrix6 jacobian = ToolJacobian(*scene_, robot_.q_rad());
+  // M a = J_t^T u f + J_r^T l with J_r a = 0: the acceleration along u of a force f with the rotation held.
+  Eigen::Matrix<double, 9, 9> held = Eigen::Matrix<double, 9, 9>::Zero();
+  held.topLeftCorner<6, 6>() = robot_.world().Inertia();
+  held.topRightCorner<6, 3>() = -jacobian.bottomRows<3>().transpose();
+  held.bottomLeftCorner<3, 6>() = jacobian.bottomRows<3>();
+  Eigen::Matrix<double, 9, 1> force = Eigen::Matrix<double, 9, 1>::Zero();
+  force.head<6>() = jacobian.topRows<3>().transpose() * u;
+  const Eigen::Matrix<double, 9, 1> answer = held.fullPivLu().solve(force);
+  EXPECT_NEAR(robot_.Contact(u).held_mass_kg * u.dot(jacobian.topRows<3>() * answer.head<6>()), 1.0, 1e-9);
+}
+
+TEST_F(ContactResponseTest, TheWorldIsAsHardAsItWas) {
+  for (const double speed_m_s : {0.01, 0.025, 0.05}) {
+    EXPECT_NEAR(PeakForce(walls_[0], speed_m_s) / (1e3 * speed_m_s), 2.15, 0.2) << speed_m_s;
+  }
+}
+
+TEST_F(ContactResponseTest, TheSpeedOfABudgetKeepsIt) {
+  for (const double budget_n : {10.0, 17.0, 25.0, 60.0}) {
+    for (const Wall& wall : walls_) {
+      Place(wall.start_m);
+      const ContactResponse contact = robot_.Contact(InWorld(wall.direction));
+      const double speed_m_s = execution::SpeedWithinBudget(contact, budget_n);
+      const double peak_n = PeakForce(wall, speed_m_s);
+      EXPECT_LE(peak_n, budget_n) << wall.direction.transpose() << " at " << speed_m_s;
+      EXPECT_GE(peak_n, 0.4 * budget_n) << wall.direction.transpose() << " at " << speed_m_s;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace feeler::env
