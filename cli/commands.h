@@ -18,5 +18,8 @@ void AddExportCommand(CLI::App& app, Session& session);
 void AddPolicyCommand(CLI::App& app, Session& session);
 void AddExperimentCommand(CLI::App& app, Session& session);
 void AddReportCommand(CLI::App& app, Session& session);
+void AddSimulateCommand(CLI::App& app, Session& session);
+void AddExecuteCommand(CLI::App& app, Session& session);
+void AddCellCommand(CLI::App& app, Session& session);
 
 }  // namespace feeler::cli

@@ -12,14 +12,13 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/perceived_target.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/model/task_file.h"
-#include "feeler/perception/cloud_file.h"
-#include "feeler/perception/depth_file.h"
 #include "feeler/perception/input_file.h"
 #include "feeler/policies/storage/database.h"
 #include "feeler/workflow/episode/episode_draw.h"
@@ -31,9 +30,7 @@ namespace {
 
 struct Flags {
   std::string task;
-  std::string depth, intrinsics, background;
-  std::string cloud;
-  std::string table;
+  TargetSources sources;
   std::string db;
   bool json = false;
 };
@@ -49,58 +46,22 @@ struct CalibrateFlags {
   bool json = false;
 };
 
-void RequireSources(const Flags& flags) {
-  if (flags.task.empty()) throw InputError("--task", "missing", "say which target to look for");
-  if (flags.table.empty()) throw InputError("--table", "missing", "make one with feeler perceive calibrate");
-  if (flags.depth.empty() == flags.cloud.empty()) {
-    throw InputError("command line", "one of --depth and --cloud is needed",
-                     "give --depth with --intrinsics, or --cloud");
-  }
-  if (!flags.depth.empty() && flags.intrinsics.empty()) {
-    throw InputError("--intrinsics", "missing", "give the JSON of the camera that took the depth image");
-  }
-  if (!flags.background.empty() && flags.depth.empty()) {
-    throw InputError("--background", "needs a depth image", "give --depth as well");
-  }
-}
-
-perception::Registration Locate(const Flags& flags, const workflow::TargetFinder& finder,
-                                const perception::UncertaintyTable& table) {
-  std::optional<perception::CameraIntrinsics> camera;
-  if (!flags.intrinsics.empty()) {
-    camera = perception::ParseIntrinsics(perception::ReadFile(flags.intrinsics), flags.intrinsics);
-  }
-  if (!flags.cloud.empty()) {
-    std::vector<std::string> notes;
-    perception::Points points = perception::ReadCloud(flags.cloud, &notes);
-    for (const std::string& note : notes) fmt::print(stderr, "{}\n", note);
-    if (!camera) return finder.InCloud(points, table.camera_m);
-    for (Eigen::Vector3d& p : points) p = camera->world_T_camera * p;
-    return finder.InCloud(points, camera->world_T_camera.translation());
-  }
-  const perception::DepthFrame depth =
-      perception::ParseDepthPng(perception::ReadFile(flags.depth), *camera, flags.depth);
-  if (flags.background.empty()) return finder.InDepth(depth, *camera);
-  const perception::DepthFrame background =
-      perception::ParseDepthPng(perception::ReadFile(flags.background), *camera, flags.background);
-  return finder.InDepth(depth, *camera, &background);
-}
-
 void Perceive(const Flags& flags) {
-  RequireSources(flags);
+  RequireSources(flags.task, flags.sources);
   const env::TaskModel model = env::LoadTask(flags.task);
   const Task& task = model.task;
   const perception::UncertaintyTable table =
-      workflow::LoadTable(flags.table, task, env::Fingerprint(model, env::Opening::kClosed));
-  planner::ProblemFamily family = workflow::FamilyOfTable(table, task, flags.table);
+      workflow::LoadTable(flags.sources.table, task, env::Fingerprint(model, env::Opening::kClosed));
+  planner::ProblemFamily family = workflow::FamilyOfTable(table, task, flags.sources.table);
   if (!flags.db.empty()) {
     policies::Database database = policies::Database::OpenReadOnly(flags.db);
     family.problems.clear();
     for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
   }
   const workflow::TargetFinder finder(model);
-  const perception::Registration found = Locate(flags, finder, table);
-  if (!found.found) throw NegativeResult(flags.depth + flags.cloud, "target not found: " + found.reason);
+  const perception::Registration found = Locate(flags.sources, finder, table);
+  if (!found.found)
+    throw NegativeResult(flags.sources.depth + flags.sources.cloud, "target not found: " + found.reason);
 
   const perception::PoseHypotheses hypotheses = perception::HypothesesFor(table, found.world_T_target);
   const auto extents = workflow::SnapTo(family, task, hypotheses.counts);
@@ -198,13 +159,7 @@ void AddPerceiveCommand(CLI::App& app, Session& session) {
   CLI::App* command =
       app.add_subcommand("perceive", "Hypotheses from a depth image or point cloud; calibrate: the table this takes");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");
-  command->add_option("--depth", flags->depth, "16-bit PNG of depths");
-  command->add_option("--intrinsics", flags->intrinsics,
-                      "JSON of the camera and where it stands (docs/file-formats.md); with --cloud: its points are in "
-                      "the camera's frame");
-  command->add_option("--background", flags->background, "depth image of the scene without the target");
-  command->add_option("--cloud", flags->cloud, "PLY or PCD file, metres, in the base frame of the robot");
-  command->add_option("--table", flags->table, "uncertainty table of the task (feeler perceive calibrate)");
+  AddTargetSources(*command, flags->sources);
   command->add_option("--db", flags->db, "give the smallest problem of this database that covers the estimate");
   command->add_flag("--json", flags->json, "print the result as JSON");
 

@@ -15,7 +15,6 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
-#include "feeler/env/model/task_inputs.h"
 
 namespace feeler::cli {
 namespace {
@@ -50,7 +49,7 @@ struct Kind {
 };
 
 /// By what our own writers begin with; the order is that of FileKind.
-constexpr std::array<Kind, 15> kKinds{{
+constexpr std::array<Kind, 16> kKinds{{
     {"a policy file",
      [](std::string_view h) {
        return h.starts_with('{') && HoldsAll(h, {"\"task\"", "\"start\"", "\"expected_cost\""});
@@ -88,6 +87,7 @@ constexpr std::array<Kind, 15> kKinds{{
        const bool alpha = !h.empty() && (std::isdigit(static_cast<unsigned char>(h.front())) != 0 || h.front() == '#');
        return alpha || HoldsAll(h, {"<Policy"}) || (h.starts_with('{') && HoldsAll(h, {"\"nodes\""}));
      }},
+    {"a cell file", [](std::string_view h) { return h.starts_with('{') && HoldsAll(h, {"\"feeler cell\""}); }},
 }};
 
 InputError CannotWrite(const Output& output, int error) {
@@ -158,14 +158,6 @@ void RequireOutputs(const std::vector<Output>& outputs, const std::vector<std::s
     }
     RequirePlace(output);
     RequireOwnKind(output);
-  }
-}
-
-std::vector<std::string> InputsOfTask(const std::string& task) {
-  try {
-    return env::FilesOfTask(task);
-  } catch (const Error&) {
-    return {env::FileOfTask(task).string()};
   }
 }
 

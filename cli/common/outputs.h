@@ -21,7 +21,8 @@ enum class FileKind {
   kExperiment,
   kManifest,
   kScene,
-  kPomdpPolicy  ///< .json, .alpha or .policyx
+  kPomdpPolicy,  ///< .json, .alpha or .policyx
+  kCell
 };
 
 struct Output {

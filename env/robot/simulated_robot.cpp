@@ -225,6 +225,17 @@ void SimulatedRobot::Hold(MotionResult& result) {
   if (result.reason == StopReason::kReached) result.world_T_tool = ToolPose();
 }
 
+bool SimulatedRobot::Interrupted(MotionResult& result) {
+  if (!interruption_) return false;
+  std::string why = interruption_();
+  if (why.empty()) return false;
+  result.reason = StopReason::kAborted;
+  result.detail = std::move(why);
+  Hold(result);
+  result.world_T_tool = ToolPose();
+  return true;
+}
+
 MotionResult SimulatedRobot::Follow(double duration_s, const ReferenceAt& reference_at, const Watch& watch,
                                     bool settle) {
   MotionResult result;
@@ -266,6 +277,7 @@ MotionResult SimulatedRobot::Follow(double duration_s, const ReferenceAt& refere
       Hold(result);
       return result;
     }
+    if (Interrupted(result)) return result;
   }
   result.world_T_tool = ToolPose();
   return result;
@@ -465,6 +477,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
         result.contact = true;
         break;
       }
+      if (Interrupted(result)) return result;
       if (t >= trajectory.duration_s()) {
         const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
         resting_s = twist.head<3>().norm() < options_.settle_speed_m_s ? resting_s + world_.timestep_s() : 0.0;
@@ -533,6 +546,7 @@ MotionResult SimulatedRobot::FollowTwist(const TwistMotion& motion) {
         if (arm) result.detail = ProtectiveStop();
         break;
       }
+      if (Interrupted(result)) return result;
     }
     if (result.reason == StopReason::kReached) {
       reference.time_s = world_.time_s();

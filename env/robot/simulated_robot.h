@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/random.h"
@@ -152,6 +153,9 @@ class SimulatedRobot : public Robot {
   void SetTargetCandidates(std::vector<Pose> world_T_target);
   /// Motions end with kTimeLimit once Time() reaches it.
   void SetDeadline(double time_s) { deadline_s_ = time_s; }
+  /// Asked after every physics step of a motion: a text brings the arm to rest, and the motion ends with kAborted and
+  /// that text. Empty: nobody is asked. Asking changes nothing.
+  void SetInterruption(std::function<std::string()> interruption) { interruption_ = std::move(interruption); }
   /// `observer` sees the world every `period_s` of simulated time (frames of a video); empty: nobody does.
   void SetObserver(std::function<void(const World&)> observer, double period_s);
 
@@ -169,6 +173,8 @@ class SimulatedRobot : public Robot {
   std::optional<JointReference> Advance(const Vector6& wanted, TwistReference& reference, JointVector& q) const;
   /// Holds the joints where they are until they rest.
   void Hold(MotionResult& result);
+  /// Whether somebody wants the motion to end; it then has.
+  bool Interrupted(MotionResult& result);
   /// The way points of a transfer; empty, with the reason, when there are none.
   std::vector<Eigen::VectorXd> PlanWay(const Pose& world_T_tool, std::string& reason);
   void TrackStep(const JointReference& reference);
@@ -207,6 +213,7 @@ class SimulatedRobot : public Robot {
   Pose tool_at_sensing_ = Pose::Identity();  ///< measured pose in the state that the sensor describes
   double peak_force_n_ = 0.0;                ///< exact, since the motion began
   double deadline_s_ = std::numeric_limits<double>::infinity();
+  std::function<std::string()> interruption_;
   std::function<void(const World&)> observer_;
   double observer_period_s_ = 0.0;
   double next_observation_s_ = 0.0;

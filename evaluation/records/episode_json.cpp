@@ -8,93 +8,45 @@
 #include "feeler/core/error.h"
 #include "feeler/core/json_depth.h"
 #include "feeler/evaluation/records/replay_json.h"
+#include "feeler/execution/records/episode_line.h"
 
 namespace feeler::evaluation {
-namespace {
-
-nlohmann::ordered_json PoseJson(const Pose& pose) {
-  const Eigen::Quaterniond q(pose.linear());
-  const Eigen::Vector3d& p = pose.translation();
-  return {{"position_m", {p.x(), p.y(), p.z()}}, {"quaternion_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
-}
-
-nlohmann::ordered_json MoveJson(const execution::MoveRecord& move) {
-  nlohmann::ordered_json json = {{"kind", move.kind}, {"direction", move.direction}, {"commanded_m", move.commanded_m}};
-  json["predicted"] = move.predicted_m ? nlohmann::ordered_json(*move.predicted_m) : nlohmann::ordered_json();
-  json["travelled_m"] = move.travelled_m;
-  json["contact"] = move.contact;
-  json["peak_force_n"] = move.peak_force_n;
-  json["duration_s"] = move.duration_s;
-  return json;
-}
-
-}  // namespace
-
 nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
-  const execution::ExecutionRecord& execution = record.execution;
-  nlohmann::ordered_json json;
-  json["task"] = record.task;
-  json["policy"] = record.policy;
-  json["noise"] = record.noise;
-  if (!record.fault_values.empty()) json["fault_values"] = record.fault_values;
-  json["seed"] = record.seed;
-  json["episode"] = record.episode;
-  json["placement"] = record.placement;
-  json["rejected_placements"] = record.rejected_placements;
-  json["truth_outside"] = record.truth_outside;
-  json["perception"] = nullptr;
-  if (record.perception) {
-    json["perception"] = {{"distance_m", record.perception->distance_m},
-                          {"fitness", record.perception->fitness},
-                          {"rms_m", record.perception->rms_m},
-                          {"points", record.perception->points}};
+  execution::EpisodeLine line;
+  line.task = record.task;
+  line.policy = record.policy;
+  line.noise = record.noise;
+  line.fault_values = record.fault_values;
+  line.seed = record.seed;
+  line.episode = record.episode;
+  line.placement = record.placement;
+  line.rejected_placements = record.rejected_placements;
+  line.truth_outside = record.truth_outside;
+  if (const auto& seen = record.perception) {
+    line.perception = {seen->distance_m, seen->fitness, seen->rms_m, seen->points};
+    line.perception_cpu_s = seen->cpu_s;
   }
-  json["extents"] = {record.extents.nx, record.extents.ny, record.extents.nz};
+  line.extents = {record.extents.nx, record.extents.ny, record.extents.nz};
   if (record.extents.n_yaw > 1 || record.extents.n_pitch > 1) {
-    json["extents"].push_back(record.extents.n_yaw);
-    json["extents"].push_back(record.extents.n_pitch);
+    line.extents.push_back(record.extents.n_yaw);
+    line.extents.push_back(record.extents.n_pitch);
   }
-  json["true_pose"] = PoseJson(record.world_T_true);
-  json["start_estimate"] = PoseJson(record.world_T_estimate0);
-  json["estimate"] =
-      execution.world_T_estimate ? PoseJson(*execution.world_T_estimate) : nlohmann::ordered_json(nullptr);
-  json["error"] = nullptr;
-  if (record.error) {
-    json["error"] = {{"lateral_m", record.error->lateral_m},
-                     {"vertical_m", record.error->vertical_m},
-                     {"angle_rad", record.error->angle_rad}};
-  }
-  json["localized"] = record.localized;
-  json["inserted"] = record.inserted;
-  json["reason"] = record.reason;
-  json["believed"] = {
-      {"localized", execution.localized}, {"inserted", execution.inserted}, {"reason", execution.reason}};
-  json["moves"] = nlohmann::ordered_json::array();
-  for (const execution::MoveRecord& move : execution.moves) json["moves"].push_back(MoveJson(move));
-  json["policy_moves"] = execution.policy_moves;
-  json["contacts"] = execution.contacts;
-  json["path_length_m"] = execution.path_length_m;
-  json["sim_time_s"] = execution.sim_time_s;
-  json["localization_time_s"] = execution.localization_time_s;
-  json["depth_m"] = record.depth_m;
-  json["lateral_m"] = record.lateral_m;
-  json["peak_force_n"] = record.peak_force_n;
-  json["force_budget_n"] = execution.force_budget_n;
-  json["budget_passings"] = execution.budget_passings;
-  json["impulse_ns"] = record.impulse_ns;
-  json["forbidden_contacts"] = record.forbidden_contacts;
-  json["pictures"] = execution.pictures;
-  json["fell_in"] = execution.fell_in;
-  json["ladder"] = nlohmann::ordered_json::array();
-  for (const execution::LadderRecord& rung : execution.ladder) {
-    json["ladder"].push_back({{"rung", rung.rung}, {"reason", rung.reason}});
-  }
-  json["timing"] = {{"perception_cpu_s", record.perception ? record.perception->cpu_s : 0.0},
-                    {"plan_cpu_s", record.timing.plan_cpu_s},
-                    {"transfer_cpu_s", record.timing.transfer_cpu_s},
-                    {"cpu_s", record.timing.cpu_s}};
-  if (record.replay) json["replay"] = ReplayJson(record);
-  return json;
+  line.world_T_true = record.world_T_true;
+  line.world_T_estimate0 = record.world_T_estimate0;
+  line.error = record.error;
+  line.localized = record.localized;
+  line.inserted = record.inserted;
+  line.reason = record.reason;
+  line.depth_m = record.depth_m;
+  line.lateral_m = record.lateral_m;
+  line.peak_force_n = record.peak_force_n;
+  line.impulse_ns = record.impulse_ns;
+  line.forbidden_contacts = record.forbidden_contacts;
+  line.plan_cpu_s = record.timing.plan_cpu_s;
+  line.transfer_cpu_s = record.timing.transfer_cpu_s;
+  line.cpu_s = record.timing.cpu_s;
+  if (record.replay) line.replay = RobotReplay(*record.replay);
+  return execution::ToJson(line, record.execution);
 }
 
 EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record) {
@@ -119,6 +71,10 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
   std::ifstream in(path);
   if (!in) throw InputError(path, "cannot be read", "give a records file written by feeler run --out");
   std::vector<EpisodeSummaryRow> rows;
+  // On a robot nobody knows what is true: what the executor believes stands for it.
+  const auto judged_or_believed = [](const nlohmann::json& json, const char* key) {
+    return json.at(key).is_null() ? json.at("believed").at(key).get<bool>() : json.at(key).get<bool>();
+  };
   int number = 0;
   for (std::string line; std::getline(in, line);) {
     ++number;
@@ -130,7 +86,7 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
       std::vector<std::string> rungs;
       for (const auto& rung : json.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());
       rows.push_back({json.at("task").get<std::string>(), json.at("policy").get<std::string>(),
-                      json.at("localized").get<bool>(), json.at("inserted").get<bool>(),
+                      judged_or_believed(json, "localized"), judged_or_believed(json, "inserted"),
                       json.at("reason").get<std::string>(), json.at("sim_time_s").get<double>(),
                       json.at("path_length_m").get<double>(), json.at("policy_moves").get<double>(),
                       json.at("contacts").get<double>(), json.at("peak_force_n").get<double>(),

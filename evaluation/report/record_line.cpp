@@ -90,6 +90,11 @@ json PackedMoves(const json& record) {
   return packed;
 }
 
+/// What the judge said; on a robot, where nobody knows what is true, what the executor believes.
+bool JudgedOrBelieved(const json& record, const char* key) {
+  return Member(record, key).is_null() ? Flag(Member(record, "believed"), key) : Flag(record, key);
+}
+
 /// What a player needs, if the record holds a replay.
 std::string ReplayLine(const json& record) {
   if (!record.contains("replay") || record.at("replay").is_null()) return "";
@@ -134,7 +139,7 @@ ReportedEpisode ReadRecordLine(const std::string& line, json& record) {
   const std::int64_t episode = Whole(record, "episode");
   Whole(record, "seed");
   ReportedEpisode reported;
-  reported.inserted = Flag(record, "inserted");
+  reported.inserted = JudgedOrBelieved(record, "inserted");
   reported.ladder = !List(record, "ladder").empty();
   json error_mm = nullptr;
   if (const json& error = Member(record, "error"); !error.is_null()) {
@@ -147,7 +152,7 @@ ReportedEpisode ReadRecordLine(const std::string& line, json& record) {
   }
   reported.row = {episode,
                   reported.inserted ? 1 : 0,
-                  Flag(record, "localized") ? 1 : 0,
+                  JudgedOrBelieved(record, "localized") ? 1 : 0,
                   Text(record, "reason"),
                   Rounded(Number(record, "sim_time_s", 0.0), 1e-4),
                   error_mm,

@@ -17,6 +17,15 @@ void RequirePositive(const char* option, double value) {
 
 }  // namespace
 
+ExecutorOptions OptionsForThreshold(double threshold_n) {
+  ExecutorOptions options;
+  if (threshold_n > options.contact_force_n) {
+    options = ExecutorOptions::WithFriction();
+    options.contact_force_n = threshold_n;
+  }
+  return options;
+}
+
 void Validate(const ExecutorOptions& options) {
   RequirePositive("transfer_speed_m_s", options.transfer_speed_m_s);
   RequirePositive("probe_speed_m_s", options.probe_speed_m_s);

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
 
 #include "feeler/execution/contact/contact_evidence.h"
+#include "feeler/execution/contact/execution_record.h"
 #include "feeler/planner/contact/travel_model.h"
 
 namespace feeler::execution {
@@ -51,6 +53,8 @@ struct ExecutorOptions {
   std::shared_ptr<planner::TravelModel> travel_model;
   MatchOptions matching;
   FitOptions fit;
+  /// Shown the record after every motion (a live view). Must not call the robot.
+  std::function<void(const ExecutionRecord&)> on_motion;
 
   static ExecutorOptions WithFriction() {
     ExecutorOptions options;
@@ -59,6 +63,9 @@ struct ExecutorOptions {
     return options;
   }
 };
+
+/// The options for a robot that tells contacts from `threshold_n` on: WithFriction where that is more than the default.
+ExecutorOptions OptionsForThreshold(double threshold_n);
 
 /// Throws InputError naming the option that is out of range or not a number.
 void Validate(const ExecutorOptions& options);

@@ -85,6 +85,7 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   if (move.peak_force_n > options_.force_budget_n) ++record_.budget_passings;
   record_.path_length_m += (report.end - before).norm() * frame_.cell_m;
   record_.moves.push_back(std::move(move));
+  if (options_.on_motion) options_.on_motion(record_);
 
   position_ = report.contact ? report.end : target;
   if (result.reason == StopReason::kAborted || result.reason == StopReason::kUnplanned) {

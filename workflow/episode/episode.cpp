@@ -11,6 +11,7 @@
 #include "feeler/core/error.h"
 #include "feeler/env/model/task_pieces.h"
 #include "feeler/env/scene/oversize_target.h"
+#include "feeler/execution/records/scored_reason.h"
 #include "feeler/execution/recovery/online_planner.h"
 #include "feeler/workflow/episode/fall_in_draw.h"
 
@@ -68,6 +69,7 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
       options_(std::move(options)),
       noise_(ParseFaults(options_.noise)),
       force_budget_n_(ForceBudget(setup_->task(), noise_, options_.force_budget_n)) {
+  noise_.robot.force_offset_n.z() += options_.force_offset_n;
   if (noise_.oversize_m > 0.0) {
     scene = std::make_shared<const env::Scene>(env::WithOversizeTarget(*scene, noise_.oversize_m));
   }
@@ -101,12 +103,9 @@ EpisodeDraw EpisodeRunner::Draw(std::uint64_t episode) {
   return draw;
 }
 
-EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
-  const Task& task = setup_->task();
-  const double cpu_start_s = ThreadCpuSeconds();
-  EpisodeDraw draw = Draw(episode);
+EpisodeRecord EpisodeRunner::Describe(std::uint64_t episode, const EpisodeDraw& draw) const {
   EpisodeRecord record;
-  record.task = task.name;
+  record.task = setup_->task().name;
   record.noise = noise_.name;
   record.seed = options_.seed;
   record.episode = episode;
@@ -116,24 +115,21 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   record.world_T_true = draw.world_T_true;
   record.world_T_estimate0 = draw.world_T_estimate;
   record.perception = draw.perception;
-  if (!draw.failure.empty()) {
-    record.reason = draw.failure;
-    record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
-    return record;
-  }
-  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
-  const double plan_start_s = ThreadCpuSeconds();
-  const std::unique_ptr<policies::Policy> policy =
-      policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});
-  const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
-  if (noise_.fall_in) {
-    RandomStream random(options_.seed, episode, "truth that falls in");
-    const auto truth = DrawFallIn(task, problem, *policy, draw.world_T_estimate, random);
-    if (truth) draw.world_T_true = TurnedByFault(task, noise_, options_.seed, episode, *truth);
-  }
+  record.reason = draw.failure;
+  return record;
+}
+
+void EpisodeRunner::DrawTruthThatFallsIn(std::uint64_t episode, const planner::Problem& problem,
+                                         policies::Policy& policy, EpisodeDraw& draw) const {
+  RandomStream random(options_.seed, episode, "truth that falls in");
+  const auto truth = DrawFallIn(setup_->task(), problem, policy, draw.world_T_estimate, random);
+  if (truth) draw.world_T_true = TurnedByFault(setup_->task(), noise_, options_.seed, episode, *truth);
+}
+
+void EpisodeRunner::Place(std::uint64_t episode, const EpisodeDraw& draw, EpisodeRecord& record) {
+  const Task& task = setup_->task();
   record.world_T_true = draw.world_T_true;
   record.truth_outside = TruthOutside(task, draw);
-
   env::ResetOptions reset;
   reset.episode = episode;
   reset.world_T_estimate = draw.world_T_estimate;
@@ -148,7 +144,63 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   reset.start = env::StartPlace::kHome;
   reset.withhold_true_pose = options_.withhold_true_pose;
   environment_->Reset(options_.seed, reset);
+}
 
+EpisodeRecord EpisodeRunner::Begin(std::uint64_t episode) {
+  EpisodeDraw draw = Draw(episode);
+  EpisodeRecord record = Describe(episode, draw);
+  if (!draw.failure.empty()) return record;
+  if (noise_.fall_in) {
+    if (!policy_factory_) {
+      throw InputError("noise", "'fall-in' asks where the policy probes, and there is none",
+                       "give a database with --db");
+    }
+    const planner::Problem problem = planner::MakeCuboidProblem(setup_->task(), setup_->map, draw.extents);
+    const auto policy = policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});
+    DrawTruthThatFallsIn(episode, problem, *policy, draw);
+  }
+  Place(episode, draw, record);
+  return record;
+}
+
+void EpisodeRunner::Score(EpisodeRecord& record) {
+  const Task& task = setup_->task();
+  const env::InsertionVerdict verdict = environment_->Judge();
+  if (record.execution.world_T_estimate) {
+    record.error = PoseErrorOf(task, record.world_T_true, *record.execution.world_T_estimate);
+    record.localized = WithinTolerance(task.tolerance, *record.error);
+  }
+  record.inserted = verdict.inserted;
+  record.verdict = env::ToString(verdict.reason);
+  record.depth_m = verdict.depth_m;
+  record.lateral_m = verdict.lateral_m;
+  const env::RobotStatistics& statistics = environment_->robot().statistics();
+  record.peak_force_n = statistics.peak_force_n;
+  record.execution.force_budget_n = force_budget_n_;
+  record.impulse_ns = statistics.impulse_ns;
+  record.forbidden_contacts = statistics.forbidden_contacts;
+  record.reason = execution::ScoredReason(record.inserted, record.verdict, record.execution);
+  if (!record.inserted && record.perception && record.truth_outside) {
+    record.reason = "truth outside the hypotheses: " + record.reason;
+  }
+}
+
+EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
+  const Task& task = setup_->task();
+  const double cpu_start_s = ThreadCpuSeconds();
+  EpisodeDraw draw = Draw(episode);
+  EpisodeRecord record = Describe(episode, draw);
+  if (!draw.failure.empty()) {
+    record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
+    return record;
+  }
+  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
+  const double plan_start_s = ThreadCpuSeconds();
+  const std::unique_ptr<policies::Policy> policy =
+      policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});
+  const double lookup_cpu_s = ThreadCpuSeconds() - plan_start_s;
+  if (noise_.fall_in) DrawTruthThatFallsIn(episode, problem, *policy, draw);
+  Place(episode, draw, record);
   record.policy = policy->name();
 
   env::SimulatedRobot& robot = environment_->robot();
@@ -157,17 +209,12 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   if (options_.replay) watched.emplace(robot, recorder);
 
   const double transfer_start_s = ThreadCpuSeconds();
-  const MotionResult transfer =
-      environment_->robot().Transfer(execution::LatticeStartPose(task, problem, draw.world_T_estimate));
+  const MotionResult transfer = robot.Transfer(execution::LatticeStartPose(task, problem, draw.world_T_estimate));
   record.timing.transfer_cpu_s = ThreadCpuSeconds() - transfer_start_s;
 
   recorder.MarkStart(robot.Time());
   if (transfer.reason == StopReason::kReached) {
-    execution::ExecutorOptions options;
-    if (reset.noise.contact_threshold_n > options.contact_force_n) {
-      options = execution::ExecutorOptions::WithFriction();
-      options.contact_force_n = reset.noise.contact_threshold_n;
-    }
+    execution::ExecutorOptions options = execution::OptionsForThreshold(noise_.robot.contact_threshold_n);
     options.force_budget_n = force_budget_n_;
     options.ladder = options_.ladder;
     options.online_planner = online_planner_;
@@ -175,39 +222,13 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options.travel_model = env::MakeExactTravel(setup_->model, env::Opening::kOpen);
     }
     if (options_.confirm_limit_m) options.confirm_limit_m = *options_.confirm_limit_m;
-    record.execution =
-        execution::Execute(task, problem, draw.world_T_estimate, *policy, environment_->robot(), options);
+    record.execution = execution::Execute(task, problem, draw.world_T_estimate, *policy, robot, options);
   } else {
-    record.execution.reason = "transfer to the start pose: " + std::string(ToString(transfer.reason)) +
-                              (transfer.detail.empty() ? "" : ", " + transfer.detail);
+    record.execution.reason = execution::TransferFailure(transfer);
   }
-
   if (options_.replay) record.replay = recorder.Take(robot.world());
 
-  // The score: from here on the truth may be looked at.
-  const env::InsertionVerdict verdict = environment_->Judge();
-  if (record.execution.world_T_estimate) {
-    record.error = PoseErrorOf(task, draw.world_T_true, *record.execution.world_T_estimate);
-    record.localized = WithinTolerance(task.tolerance, *record.error);
-  }
-  record.inserted = verdict.inserted;
-  record.depth_m = verdict.depth_m;
-  record.lateral_m = verdict.lateral_m;
-  const env::RobotStatistics& statistics = environment_->robot().statistics();
-  record.peak_force_n = statistics.peak_force_n;
-  record.execution.force_budget_n = force_budget_n_;
-  record.impulse_ns = statistics.impulse_ns;
-  record.forbidden_contacts = statistics.forbidden_contacts;
-  if (record.inserted) {
-    record.reason = "inserted";
-  } else if (record.execution.inserted) {
-    record.reason = "believed inserted, but " + std::string(env::ToString(verdict.reason));
-  } else {
-    record.reason = record.execution.reason;
-  }
-  if (!record.inserted && draw.perception && record.truth_outside) {
-    record.reason = "truth outside the hypotheses: " + record.reason;
-  }
+  Score(record);  // from here on the truth may be looked at
   record.timing.plan_cpu_s = lookup_cpu_s + record.execution.policy_cpu_s;
   record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
   return record;

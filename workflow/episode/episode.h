@@ -39,6 +39,7 @@ struct EpisodeOptions {
   bool replay = false;
   /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
   bool withhold_true_pose = false;
+  double force_offset_n = 0.0;  ///< of the force sensor along z, beside the noise
 };
 
 /// The force budget of episodes with those faults, N: the one that is wanted, or the task's, or what the noise of the
@@ -57,11 +58,25 @@ class EpisodeRunner {
                 PolicyFactory policy_factory, EpisodeOptions options);
 
   EpisodeRecord Run(std::uint64_t episode);
+
+  // The same in steps, for a robot that somebody else moves.
+  /// Draws the episode and places everything. `reason` of the record is empty, or why there is no episode. Null as
+  /// policy factory will do, unless a fault asks where the policy probes.
+  EpisodeRecord Begin(std::uint64_t episode);
+  /// Adds what is true of the world as it stands, and says so in `reason`: the score of what `execution` believes.
+  void Score(EpisodeRecord& record);
+
+  const EpisodeOptions& options() const { return options_; }
+  const EpisodeFaults& faults() const { return noise_; }
   /// The world of the runner, e.g. to watch it.
   env::InsertionEnv& environment() { return *environment_; }
 
  private:
   EpisodeDraw Draw(std::uint64_t episode);
+  EpisodeRecord Describe(std::uint64_t episode, const EpisodeDraw& draw) const;
+  void DrawTruthThatFallsIn(std::uint64_t episode, const planner::Problem& problem, policies::Policy& policy,
+                            EpisodeDraw& draw) const;
+  void Place(std::uint64_t episode, const EpisodeDraw& draw, EpisodeRecord& record);
 
   std::shared_ptr<const PlanningSetup> setup_;
   PolicyFactory policy_factory_;

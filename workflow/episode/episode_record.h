@@ -33,6 +33,7 @@ struct EpisodeRecord {
   bool localized = false;                     ///< the final estimate lies within the task's tolerance on every axis
   bool inserted = false;                      ///< as the environment judges it
   std::string reason;                         ///< "inserted", or why not
+  std::string verdict;                        ///< of the judge: "inserted", "too shallow", ...
   double depth_m = 0.0;                       ///< of the tool below the mouth, along the insertion, at the verdict
   double lateral_m = 0.0;                     ///< of the tool beside the axis of the opening, at the verdict
   double peak_force_n = 0.0;                  ///< exact contact force on tool and gripper

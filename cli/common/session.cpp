@@ -1,4 +1,4 @@
-#include "feeler/cli/session.h"
+#include "feeler/cli/common/session.h"
 
 #include "feeler/cli/common/console.h"
 #include "feeler/core/interrupted.h"

@@ -1,10 +1,10 @@
-#include "feeler/workflow/episode/pose_error.h"
+#include "feeler/execution/records/pose_error.h"
 
 #include <cmath>
 
 #include "feeler/core/direction.h"
 
-namespace feeler::workflow {
+namespace feeler::execution {
 
 PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose) {
   const Pose difference = reference.inverse() * pose;
@@ -20,4 +20,4 @@ bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
          error.angle_rad <= tolerance.angle_rad;
 }
 
-}  // namespace feeler::workflow
+}  // namespace feeler::execution

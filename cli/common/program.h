@@ -1,0 +1,18 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string_view>
+
+#include "feeler/cli/common/session.h"
+#include "feeler/core/progress.h"
+
+namespace feeler::cli {
+
+/// What a program of ours begins with: open streams, signals that cancel, and one line for whatever ends it.
+void BeginProgram(CancellationToken& cancellation);
+
+/// Parses the arguments and runs what they ask for. Whatever goes wrong becomes one line on standard error. Returns the
+/// exit code: 0 done, 1 ran and the answer is no, 2 bad usage or input.
+int RunProgram(CLI::App& app, const Session& session, int argc, char** argv);
+
+}  // namespace feeler::cli

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "feeler/cli/common/progress_bar.h"
+#include "feeler/core/progress.h"
+
+namespace feeler::cli {
+
+/// What every subcommand shares: the Ctrl-C token and the exit code it leaves (0 done, 1 the answer is no).
+struct Session {
+  CancellationToken* cancellation = nullptr;
+  int exit_code = 0;
+};
+
+/// Prints a result for machines: one JSON document on stdout.
+void PrintJson(const nlohmann::json& value);
+
+/// Updates the bar, and ends the work with Interrupted where a signal has come: for work that leaves nothing to keep
+/// when it is given up. The bar must outlive the callback.
+ProgressCallback Interruptible(ProgressBar& bar, const Session& session);
+
+}  // namespace feeler::cli

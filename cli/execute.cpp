@@ -1,0 +1,93 @@
+// feeler execute: finds the target and the bundle where they are asked for, then becomes feeler-execute, which links no
+// simulator.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <climits>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "feeler/cli/commands.h"
+#include "feeler/cli/common/console.h"
+#include "feeler/cli/perceived_target.h"
+#include "feeler/core/error.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/policies/storage/task_bundle.h"
+#include "feeler/workflow/setup/bundle.h"
+#include "feeler/workflow/setup/planning_setup.h"
+
+namespace feeler::cli {
+namespace {
+
+struct Flags {
+  std::string task;
+  std::string db;
+  TargetSources sources;
+};
+
+/// The program beside this one, else the one on the path.
+std::string ExecuteProgram() {
+  std::array<char, PATH_MAX> own{};
+  const ssize_t length = readlink("/proc/self/exe", own.data(), own.size() - 1);
+  if (length > 0) {
+    const auto beside = std::filesystem::path(std::string(own.data(), static_cast<std::size_t>(length))).parent_path() /
+                        "feeler-execute";
+    if (std::filesystem::exists(beside)) return beside;
+  }
+  return "feeler-execute";
+}
+
+/// Databases of older versions have no bundle beside them: it is made where the task is given.
+void EnsureBundle(const Flags& flags) {
+  if (flags.task.empty() || flags.db.empty() || std::filesystem::exists(policies::BundlePathOf(flags.db))) return;
+  policies::Database database = policies::Database::OpenReadOnly(flags.db);
+  const workflow::PlanningSetup setup =
+      workflow::LoadPlanningSetup(flags.task, workflow::SetupOptionsOf(database.identity()));
+  database.RequireFingerprint(setup.task().name, setup.fingerprint);
+  workflow::KeepBundle(setup, flags.db);
+}
+
+void Execute(const Flags& flags, const std::vector<std::string>& others) {
+  std::vector<std::string> arguments = {"feeler execute"};
+  const auto give = [&](const char* name, const std::string& value) {
+    if (!value.empty()) arguments.insert(arguments.end(), {name, value});
+  };
+  give("--task", flags.task);
+  give("--db", flags.db);
+  if (flags.sources.any()) {
+    const PerceivedTarget target = FindTarget(flags.task, flags.db, flags.sources);
+    Note("feeler: target at {}, {} hypotheses ({})\n", target.estimate, target.hypotheses, target.extents);
+    give("--estimate", target.estimate);
+    give("--extents", target.extents);
+  }
+  arguments.insert(arguments.end(), others.begin(), others.end());
+  EnsureBundle(flags);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const std::string program = ExecuteProgram();
+  execvp(program.c_str(), argv.data());
+  throw InputError("feeler-execute", std::string("cannot be started: ") + std::strerror(errno),
+                   "install it beside feeler");
+}
+
+}  // namespace
+
+void AddExecuteCommand(CLI::App& app, Session& /*session*/) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = app.add_subcommand(
+      "execute", "Carry a policy out on a robot, or its simulation, over a wire (docs/robot-protocol.md)");
+  command->set_help_flag();  // feeler-execute has the options
+  command->allow_extras();
+  command->add_option("--task", flags->task, "the task of the database");
+  command->add_option("--db", flags->db, "policy database of the task");
+  AddTargetSources(*command, flags->sources);
+  command->callback([flags, command] { Execute(*flags, command->remaining()); });
+}
+
+}  // namespace feeler::cli

@@ -1,0 +1,16 @@
+#include "feeler/env/model/task_inputs.h"
+
+#include "feeler/cli/common/outputs.h"
+#include "feeler/core/error.h"
+
+namespace feeler::cli {
+
+std::vector<std::string> InputsOfTask(const std::string& task) {
+  try {
+    return env::FilesOfTask(task);
+  } catch (const Error&) {
+    return {env::FileOfTask(task).string()};
+  }
+}
+
+}  // namespace feeler::cli

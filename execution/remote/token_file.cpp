@@ -1,0 +1,30 @@
+#include "feeler/execution/remote/token_file.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "feeler/core/error.h"
+
+namespace feeler::execution {
+
+std::string ReadTokenFile(const std::string& path) {
+  if (path.empty()) return "";
+  constexpr std::size_t kMost = 200;
+  struct stat status {};
+  std::ifstream in(path);
+  std::string token;
+  if (stat(path.c_str(), &status) != 0 || !in) throw InputError(path, "cannot be read", "give a file with the token");
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0 && S_ISREG(status.st_mode)) {
+    throw InputError(path, "others may read the token", "chmod 600 it");
+  }
+  std::getline(in, token);
+  const bool printable = std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
+  if (token.empty() || token.size() > kMost || !printable) {
+    throw InputError(path, "its first line is no token", "write 1 to 200 letters and digits, without blanks");
+  }
+  return token;
+}
+
+}  // namespace feeler::execution

@@ -1,0 +1,284 @@
+"""The robot's end of feeler's wire protocol (docs/robot-protocol.md, JSON form) for drivers in Python.
+
+A driver has these members; poses are 4x4 numpy arrays base_T_tool, SI units:
+
+  name, capabilities          a text, and a dict as in the protocol's `capabilities`
+  pose(), wrench(), time()    now; wrench: six numbers, of the world on the tool, base axes
+  zero()                      the present wrench is zero
+  protective_stopped()        whether the robot stopped by itself
+  recover()                   after a person has looked
+  transfer(goal)              } generators: each yields at least every 10 ms while the robot moves, and returns
+  linear(goal, speed, force)  } (reason, contact, peak_force, pose, detail); closed early they bring the robot to
+  guarded(direction, distance, speed, force)                                     } rest (a finally clause)
+  compliant(poses, speed, force, time, stiffness, rotational_stiffness)          }
+
+Nothing moves before hello and start, nor after a frame that is not sound, a number out of sequence or a silent link; a
+motion under way is brought to rest. `serve` handles one session after the other.
+"""
+import hmac
+import json
+import os
+import select
+import socket
+import time
+
+import numpy as np
+
+VERSION, UNITS = 1, "m kg s rad N"
+BEAT_S, LINK_TIMEOUT_S, MOST_BYTES = 0.02, 0.1, 1 << 18
+MOTIONS = ("transfer", "linear", "guarded", "compliant")
+
+
+def rows(pose):
+    return [float(v) for v in np.asarray(pose)[:3, :].reshape(-1)]
+
+
+def matrix(numbers):
+    pose = np.eye(4)
+    pose[:3, :] = np.array(numbers, float).reshape(3, 4)
+    r = pose[:3, :3]
+    if np.abs(r.T @ r - np.eye(3)).max() > 1e-4 or np.linalg.det(r) < 0:
+        raise ValueError("the rotation of a pose is no rotation")
+    return pose
+
+
+def schema_validator(path=None):
+    """Checks messages against the protocol's JSON Schema; needs the package jsonschema."""
+    import jsonschema
+
+    here = os.path.dirname(os.path.abspath(__file__))
+    with open(path or os.path.join(here, "..", "..", "execution", "remote", "protocol.schema.json")) as f:
+        schema = json.load(f)
+    known = {}
+
+    def validate(name, message):
+        if name not in schema["$defs"]:
+            raise ValueError("no message of that type")
+        if name not in known:
+            known[name] = jsonschema.Draft202012Validator({"$ref": "#/$defs/" + name, "$defs": schema["$defs"]})
+        for error in known[name].iter_errors(message):
+            raise ValueError(error.message[:200])
+
+    return validate
+
+
+def listen(host, port, token):
+    if not (host.startswith("127.") or host in ("localhost", "::1")) and not token:
+        raise SystemExit("others than this machine reach " + host + ", and no token is asked for: give --token-file")
+    return socket.create_server((host, port))
+
+
+class SessionOver(Exception):
+    pass
+
+
+class Server:
+    """`validator(name, message)` raises ValueError where a message is not as `$defs/name` of the schema says."""
+
+    def __init__(self, driver, token="", validator=None):
+        self.driver, self.token, self.validator = driver, token, validator or schema_validator()
+        self.motions = 0
+
+    # ---- the wire
+    def _send(self, message):
+        try:
+            self.connection.sendall(json.dumps(message, allow_nan=False).encode() + b"\n")
+        except OSError as error:
+            raise SessionOver(str(error)) from error
+
+    def _receive(self, wait_s):
+        """The next frame, or None."""
+        end = time.monotonic() + wait_s
+        while b"\n" not in self.buffer:
+            if len(self.buffer) > MOST_BYTES:
+                raise ValueError("a frame is too long")
+            ready, _, _ = select.select([self.connection], [], [], max(0.0, end - time.monotonic()))
+            if not ready:
+                return None
+            try:
+                got = self.connection.recv(65536)
+            except OSError as error:
+                raise SessionOver(str(error)) from error
+            if not got:
+                raise SessionOver("the other end is gone")
+            self.buffer += got
+        line, _, self.buffer = self.buffer.partition(b"\n")
+        self.heard = time.monotonic()
+
+        def once(pairs):
+            if len({k for k, _ in pairs}) != len(pairs):
+                raise ValueError("a key stands twice")
+            return dict(pairs)
+
+        def no_number(text):
+            raise ValueError(text + " is no number")
+
+        frame = json.loads(line.decode("utf-8"), object_pairs_hook=once, parse_constant=no_number)
+        if not isinstance(frame, dict) or not isinstance(frame.get("type"), str):
+            raise ValueError("is no message")
+        self.validator("request_" + frame["type"], frame)
+        return frame
+
+    def _state(self):
+        return {"time_s": float(self.driver.time()), "pose": rows(self.driver.pose()),
+                "wrench": [float(v) for v in self.driver.wrench()], "mode": self.mode}
+
+    def _beat(self):
+        now = time.monotonic()
+        if now - self.told >= BEAT_S:
+            self.told = now
+            self._send({"type": "state", "seq": 0, "state": self._state()})
+        if now - self.heard > LINK_TIMEOUT_S:
+            raise SessionOver("silent for 0.1 s")
+
+    def _error(self, seq, code, text):
+        self._send({"type": "error", "seq": seq, "code": code, "text": text[:400]})
+
+    # ---- sessions
+    def serve(self, listener, sessions=None):
+        while sessions is None or sessions > 0:
+            connection, _ = listener.accept()
+            self.session(connection)
+            if sessions is not None:
+                sessions -= 1
+
+    def session(self, connection):
+        self.connection, self.buffer, self.mode, self.seq = connection, b"", "waiting", 0
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.heard = self.told = time.monotonic()
+        try:
+            if self._greet():
+                while self._serve_one():
+                    pass
+        except SessionOver:
+            pass
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            try:
+                self._error(self.seq, "malformed", str(error))
+            except SessionOver:
+                pass
+        finally:
+            connection.close()
+
+    def _greet(self):
+        frame = self._receive(2.0)
+        if frame is None:
+            return False
+        if frame["type"] != "hello" or frame["seq"] != 0:
+            self._error(frame["seq"], "sequence", "a session begins with hello, number 0")
+        elif frame["version"] != VERSION:
+            self._error(0, "version", f"this robot speaks version {VERSION}")
+        elif frame["units"] != UNITS:
+            self._error(0, "units", "this robot counts in " + UNITS)
+        elif self.token and not hmac.compare_digest(frame["token"].encode(), self.token.encode()):
+            self._error(0, "token", "a wrong token")
+        else:
+            self._send({"type": "welcome", "seq": 0, "version": VERSION, "units": UNITS, "robot": self.driver.name,
+                        "simulated": False, "lockstep": False, "link_timeout_s": LINK_TIMEOUT_S,
+                        "capabilities": self.driver.capabilities, "state": self._state()})
+            return True
+        return False
+
+    def _serve_one(self):
+        frame = self._receive(BEAT_S / 2)
+        self._beat()
+        if frame is None or frame["type"] == "heartbeat":
+            return True
+        if frame["seq"] != self.seq + 1:
+            self._error(frame["seq"], "sequence", f"number {frame['seq']} where {self.seq + 1} is due")
+            return False
+        self.seq, kind = frame["seq"], frame["type"]
+        if kind == "bye":
+            return False
+        if self.driver.protective_stopped():
+            self.mode = "protective_stop"
+        if kind in MOTIONS:
+            return self._move(kind, frame)
+        if kind == "start" and self.mode == "waiting":
+            self.mode = "ready"
+        elif kind == "recover" and self.mode == "protective_stop":
+            self.driver.recover()
+            self.mode = "ready"
+        elif kind == "zero":
+            self.driver.zero()
+        elif kind == "contact":
+            c = self.driver.capabilities
+            self._send({"type": "contact", "seq": self.seq, "held_mass_kg": c["effective_mass_kg"],
+                        "free_mass_kg": c["effective_mass_kg"], "stiffness_n_m": 6e4, "damping_ratio": 1.0,
+                        "reaction_time_s": c["reaction_time_s"], "force_noise_n": c["force_noise_n"]})
+            return True
+        elif kind not in ("state", "stop", "start", "recover"):
+            self._error(self.seq, "refused", "this robot does not know " + kind)
+            return True
+        self._send({"type": "state", "seq": self.seq, "state": self._state()})
+        return True
+
+    def _refusal(self, kind, frame):
+        if self.mode == "waiting":
+            return "the operator has not started the robot"
+        if self.mode != "ready":
+            return "a protective stop has not been recovered from"
+        c = self.driver.capabilities
+        if frame.get("speed_m_s", 0.0) > c["max_speed_m_s"] * (1 + 1e-9):
+            return "outside of the limits of the robot: speed"
+        if frame.get("force_limit_n", 0.0) > c["max_force_n"]:
+            return "outside of the limits of the robot: force"
+        if kind == "guarded":
+            places = [self.driver.pose()[:3, 3] + frame["distance_m"] * np.array(frame["direction"])]
+        else:
+            places = [matrix(p)[:3, 3] for p in (frame["poses"] if kind == "compliant" else [frame["pose"]])]
+        for place in places:
+            if (place < np.array(c["workspace_min_m"])).any() or (place > np.array(c["workspace_max_m"])).any():
+                return "outside of the limits of the robot: workspace"
+        return ""
+
+    def _motion(self, kind, m):
+        if kind == "transfer":
+            return self.driver.transfer(matrix(m["pose"]))
+        if kind == "linear":
+            return self.driver.linear(matrix(m["pose"]), m["speed_m_s"], m["contact_force_n"])
+        if kind == "guarded":
+            direction = np.array(m["direction"], float)
+            if abs(np.linalg.norm(direction) - 1) > 1e-3:
+                raise ValueError("a direction is no unit vector")
+            return self.driver.guarded(direction, m["distance_m"], m["speed_m_s"], m["contact_force_n"])
+        return self.driver.compliant([matrix(p) for p in m["poses"]], m["speed_m_s"], m["force_limit_n"],
+                                     m["time_limit_s"], m["stiffness_n_m"], m["rotational_stiffness_nm_rad"])
+
+    def _move(self, kind, frame):
+        refusal = self._refusal(kind, frame)
+        if refusal:
+            self._error(self.seq, "refused", refusal)
+            return True
+        begin = self.driver.pose()[:3, 3].copy()
+        motion = self._motion(kind, frame)
+        self.mode = "moving"
+        self.motions += 1
+        stop, result = None, None
+        try:
+            while result is None:
+                try:
+                    next(motion)
+                except StopIteration as ended:
+                    result = ended.value
+                    break
+                self._beat()
+                other = self._receive(0.0)
+                if self.driver.protective_stopped():
+                    result = ("aborted", False, 0.0, None, "protective stop")
+                elif other is not None and other["type"] == "stop":
+                    stop, result = other, ("aborted", False, 0.0, None, "stopped by order")
+                elif other is not None and other["type"] != "heartbeat":
+                    raise ValueError("one request at a time")
+        finally:
+            motion.close()  # at rest, whatever ended it
+            self.mode = "protective_stop" if self.driver.protective_stopped() else "ready"
+        reason, contact, peak, pose, detail = result
+        pose = self.driver.pose() if pose is None else pose
+        self._send({"type": "result", "seq": self.seq, "reason": reason, "contact": bool(contact),
+                    "travelled_m": float(np.linalg.norm(pose[:3, 3] - begin)), "peak_force_n": float(peak),
+                    "pose": rows(pose), "detail": detail, "state": self._state()})
+        if stop is not None:
+            self.seq = stop["seq"]
+            self._send({"type": "state", "seq": self.seq, "state": self._state()})
+        return True

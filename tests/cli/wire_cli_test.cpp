@@ -1,0 +1,227 @@
+// Laws of feeler simulate and feeler execute: in lockstep the records over the wire are those of feeler run, byte for
+// byte but the times measured; a dry run moves nothing; what goes wrong to order ends an episode with its true reason,
+// and the next one is sound; bad input is one line; the executor's binary links no simulator.
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/cli/run_feeler.h"
+
+namespace feeler::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const std::string& Database() {
+  static const std::string path = [] {
+    const std::string file = ScratchFolder("wire") + "/plug.db";
+    const CommandResult made =
+        RunFeeler({"preprocess", "--task", "plug", "--out", file, "--family", "4x4x4", "--jobs", "1"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return file;
+  }();
+  return path;
+}
+
+/// A port that nobody listens on at this moment.
+int FreePort() {
+  const int s = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(bind(s, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  socklen_t size = sizeof address;
+  getsockname(s, reinterpret_cast<sockaddr*>(&address), &size);
+  close(s);
+  return ntohs(address.sin_port);
+}
+
+/// feeler simulate in the background, in lockstep, until it ends by itself or the object goes.
+class Simulation {
+ public:
+  explicit Simulation(const std::vector<std::string>& more)
+      : address_("127.0.0.1:" + std::to_string(FreePort())), folder_(ScratchFolder("simulation")) {
+    std::vector<std::string> arguments = {FEELER_BINARY, "simulate", "--task",     "plug",      "--listen",
+                                          address_,      "--json",   "--lockstep", "--extents", "4x4x4"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    child_ = fork();
+    if (child_ == 0) {
+      if (freopen((folder_ + "/out").c_str(), "w", stdout) == nullptr) _exit(126);
+      if (freopen((folder_ + "/err").c_str(), "w", stderr) == nullptr) _exit(126);
+      std::vector<char*> argv;
+      for (std::string& argument : arguments) argv.push_back(argument.data());
+      argv.push_back(nullptr);
+      execv(FEELER_BINARY, argv.data());
+      _exit(127);
+    }
+  }
+  ~Simulation() {
+    if (child_ > 0) Stop();
+  }
+  const std::string& address() const { return address_; }
+  /// What it says at its end; it is told to end where it would wait for more.
+  Json Stop() {
+    kill(child_, SIGTERM);
+    return Wait();
+  }
+  Json Wait() {
+    int status = 0;
+    waitpid(child_, &status, 0);
+    child_ = 0;
+    const Json seen = Json::parse(ReadFile(folder_ + "/out"), nullptr, false);
+    EXPECT_FALSE(seen.is_discarded()) << ReadFile(folder_ + "/err");
+    return seen;
+  }
+
+ private:
+  std::string address_;
+  std::string folder_;
+  pid_t child_ = 0;
+};
+
+std::vector<std::string> Execute(const std::string& address, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"execute", "--db", Database(), "--robot", address};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+/// The lines of a records file, what was measured taken out.
+std::vector<std::string> Untimed(const std::string& path) {
+  std::vector<std::string> lines;
+  std::istringstream in(ReadFile(path));
+  for (std::string line; std::getline(in, line);) {
+    Json record = Json::parse(line);
+    EXPECT_EQ(record.erase("timing"), 1U);
+    lines.push_back(record.dump());
+  }
+  return lines;
+}
+
+TEST(WireCli, RecordsInLockstepAreThoseOfOneProcess) {
+  for (const std::string noise : {"ideal", "force-noise=1,yaw=1"}) {
+    const std::string folder = ScratchFolder("wire_records");
+    const std::vector<std::string> episodes = {"--seed", "3", "--episodes", "3", "--noise", noise};
+    std::vector<std::string> run = {
+        "run", "--task", "plug", "--db", Database(), "--extents", "4x4x4", "--out", folder + "/run.jsonl"};
+    run.insert(run.end(), episodes.begin(), episodes.end());
+    EXPECT_EQ(RunFeeler(run).exit_code, 0);
+    Simulation simulation(episodes);
+    const CommandResult executed = RunFeeler(Execute(
+        simulation.address(), {"--task", "plug", "--extents", "4x4x4", "--out", folder + "/wire.jsonl", "--json"}));
+    EXPECT_EQ(executed.exit_code, 0) << executed.err;
+    EXPECT_EQ(simulation.Wait().at("episodes_judged"), 3);
+    const std::vector<std::string> direct = Untimed(folder + "/run.jsonl");
+    EXPECT_EQ(direct.size(), 3U);
+    EXPECT_EQ(Untimed(folder + "/wire.jsonl"), direct) << noise;
+    const Json summary = Json::parse(executed.out);
+    EXPECT_EQ(summary.at("episodes"), 3);
+    EXPECT_EQ(summary.at("links_lost"), 0);
+  }
+}
+
+TEST(WireCli, ADryRunPrintsMotionsAndMovesNothing) {
+  Simulation simulation({"--seed", "3"});
+  const CommandResult dry = RunFeeler(Execute(simulation.address(), {"--dry-run"}));
+  EXPECT_EQ(dry.exit_code, 0) << dry.err;
+  EXPECT_NE(dry.out.find("guarded"), std::string::npos) << dry.out;
+  EXPECT_NE(dry.out.find("compliant"), std::string::npos) << "the insertion is shown, too: " << dry.out;
+  EXPECT_EQ(simulation.Stop().at("motions"), 0);
+}
+
+TEST(WireCli, WhatGoesWrongIsTheReasonAndTheNextEpisodeIsSound) {
+  const std::string out = ScratchFolder("wire_faults") + "/records.jsonl";
+  Simulation simulation(
+      {"--seed", "5", "--episodes", "8", "--no-replay", "--faults",
+       "drop=0.3,stall=0.3,protective=0.2,malformed=0.2,half=0.2,nan=0.1,backwards=0.1,jump=0.1,version=0.2"});
+  const CommandResult executed = RunFeeler(Execute(simulation.address(), {"--out", out, "--json"}));
+  EXPECT_EQ(executed.exit_code, 0) << executed.err;
+  const Json seen = simulation.Wait();
+  EXPECT_FALSE(seen.at("faults").empty());
+  int inserted = 0;
+  int broken = 0;
+  std::istringstream in(ReadFile(out));
+  for (std::string line; std::getline(in, line);) {
+    const Json record = Json::parse(line);
+    const std::string reason = record.at("reason");
+    EXPECT_EQ(record.at("forbidden_contacts"), 0) << reason;
+    if (record.at("inserted").get<bool>()) {
+      ++inserted;
+      continue;
+    }
+    ++broken;
+    EXPECT_TRUE(reason.find("link lost") != std::string::npos || reason.find("protective stop") != std::string::npos)
+        << reason;
+  }
+  EXPECT_EQ(inserted + broken, 8);
+  EXPECT_GT(inserted, 0);
+  EXPECT_GT(broken, 0);
+  EXPECT_EQ(seen.at("refused_motions"), 0) << "a motion was sent after a protective stop";
+}
+
+TEST(WireCli, AMotionOutsideOfTheBoxIsNotSent) {
+  Simulation simulation({"--seed", "3", "--no-replay"});
+  const std::string out = ScratchFolder("wire_box") + "/records.jsonl";
+  const CommandResult executed =
+      RunFeeler(Execute(simulation.address(), {"--box", "-1,-1,1.2,1,1,1.6", "--out", out, "--json"}));
+  EXPECT_EQ(executed.exit_code, 0) << executed.err;
+  EXPECT_EQ(simulation.Wait().at("motions"), 0);
+  EXPECT_NE(ReadFile(out).find("outside of the workspace box"), std::string::npos) << ReadFile(out);
+}
+
+TEST(WireCli, BadInputIsOneLine) {
+  const auto refused = [](const std::vector<std::string>& arguments, const std::string& word) {
+    const CommandResult result = RunFeeler(arguments);
+    EXPECT_NE(result.exit_code, 0) << result.out;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_NE(result.err.find("feeler: error: "), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(word), std::string::npos) << result.err;
+  };
+  const std::string nowhere = "127.0.0.1:1";
+  refused(Execute("nonsense", {}), "HOST:PORT");
+  refused(Execute(nowhere, {"--estimate", "1,2,3"}), "--estimate");
+  refused(Execute(nowhere, {"--estimate", "1,2,3,0.5,0,0,0"}), "quaternion");
+  refused(Execute(nowhere, {"--box", "0,0,0,1,1,0"}), "--box");
+  refused(Execute(nowhere, {"--task", "round-peg"}), "--task");
+  refused(Execute(nowhere, {"--cell", Database()}), "");
+  refused(Execute(nowhere, {"--token-file", "/nowhere"}), "/nowhere");
+  refused({"execute", "--db", "/nowhere.db", "--robot", nowhere}, "/nowhere.db");
+  refused({"simulate", "--task", "plug", "--listen", "0.0.0.0:0"}, "token");
+  refused({"simulate", "--task", "plug", "--listen", "127.0.0.1:0", "--faults", "gremlins=1"}, "gremlins");
+  const std::string folder = ScratchFolder("wire_bad");
+  WriteFile(folder + "/cell.json", R"({"format":"feeler cell","version":1,"tool":"round-peg"})");
+  refused(Execute(nowhere, {"--cell", folder + "/cell.json"}), "round-peg");
+  WriteFile(folder + "/token", "secret\n");
+  chmod((folder + "/token").c_str(), 0600);
+  Simulation simulation({"--seed", "3", "--token-file", folder + "/token"});
+  refused(Execute(simulation.address(), {}), "token");
+  refused(Execute(simulation.address(), {"--token-file", folder + "/token", "--extents", "3x3x3"}), "--extents");
+  EXPECT_EQ(simulation.Stop().at("motions"), 0);
+}
+
+TEST(WireCli, TheExecutorLinksNoSimulator) {
+  const std::string program = std::filesystem::path(FEELER_BINARY).parent_path() / "feeler-execute";
+  std::string libraries;
+  FILE* pipe = popen(("ldd " + program).c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::array<char, 512> part{};
+  while (fgets(part.data(), part.size(), pipe) != nullptr) libraries += part.data();
+  EXPECT_EQ(pclose(pipe), 0);
+  EXPECT_NE(libraries.find("libsqlite3"), std::string::npos) << libraries;
+  for (const char* heavy : {"mujoco", "EGL", "opencv", "assimp", "TKernel"}) {
+    EXPECT_EQ(libraries.find(heavy), std::string::npos) << libraries;
+  }
+}
+
+}  // namespace
+}  // namespace feeler::cli

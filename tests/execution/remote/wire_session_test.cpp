@@ -1,0 +1,339 @@
+// Laws of a session, over loopback with a point robot in lockstep: nothing moves before hello and start, after what is
+// not sound, out of sequence, or after the loss of the link; a motion under way comes to rest; a client that heard
+// nonsense sends no further motion; one session at a time; the next session starts anew.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "feeler/core/error.h"
+#include "feeler/execution/remote/checked_robot.h"
+#include "feeler/execution/remote/remote_robot.h"
+#include "feeler/execution/remote/robot_server.h"
+#include "tests/execution/remote/point_robot.h"
+
+namespace feeler::execution {
+namespace {
+
+/// A server of a point robot on a port of its own, in a thread, until it goes.
+class Cell {
+ public:
+  explicit Cell(ServerOptions options = {}, bool simulated = false) : listener_("--listen", {"127.0.0.1", 0}) {
+    options.lockstep = true;
+    ServedRobot served = robot.Served();
+    if (simulated) {
+      served.begin_episode = [](std::optional<std::uint64_t> episode) {
+        EpisodeReply reply;
+        reply.episode = episode.value_or(0);
+        reply.extents = {2, 2, 2};
+        return reply;
+      };
+    }
+    server = std::make_unique<RobotServer>(served, options);
+    thread_ = std::thread([this] {
+      while (!ending_.cancelled()) {
+        if (auto connection = listener_.Accept(0.02))
+          ends.push_back(server->Serve(std::move(*connection), &listener_, &ending_));
+      }
+    });
+  }
+  ~Cell() { Stop(); }
+  void Stop() {
+    ending_.Cancel();
+    if (thread_.joinable()) thread_.join();
+  }
+  Connection Dial() const { return Connect({"127.0.0.1", listener_.port()}, 5.0); }
+  std::unique_ptr<RemoteRobot> Remote(const std::string& token = "") const {
+    RemoteOptions options;
+    options.token = token;
+    return std::make_unique<RemoteRobot>(Dial(), options);
+  }
+
+  PointRobot robot;
+  std::unique_ptr<RobotServer> server;
+  std::vector<SessionEnd> ends;
+
+ private:
+  Listener listener_;
+  CancellationToken ending_;
+  std::thread thread_;
+};
+
+GuardedMotion Down(double distance_m = 0.05) { return {-Eigen::Vector3d::UnitZ(), distance_m, 0.05, 5.0}; }
+
+std::string Ask(Connection& connection, const std::string& line) {
+  connection.Write(line + "\n");
+  std::string reply;
+  return connection.ReadLine(reply, 5.0) == LineStatus::kLine ? reply : "";
+}
+
+std::string Hello(const std::string& token = "", int version = kProtocolVersion,
+                  const std::string& units = std::string(kProtocolUnits)) {
+  return EncodeRequest(WireForm::kJson, 0, HelloRequest{version, units, "test", token});
+}
+std::string Line(std::uint64_t seq, const Request& request) { return EncodeRequest(WireForm::kJson, seq, request); }
+
+TEST(WireSession, AMotionIsTheRobotsOwn) {
+  Cell cell;
+  const auto remote = cell.Remote();
+  remote->Start();
+  EXPECT_EQ(remote->welcome().robot, "point");
+  const MotionResult free = remote->Guarded(Down());
+  EXPECT_EQ(free.reason, StopReason::kReached);
+  EXPECT_EQ(free.travelled_m, 0.05);
+  const MotionResult floor = remote->Guarded(Down(0.2));
+  EXPECT_EQ(floor.reason, StopReason::kContact);
+  EXPECT_EQ(floor.world_T_tool.translation().z(), 0.0);
+  EXPECT_GT(remote->Time(), 1.9);
+  remote->ZeroWrench();
+  remote->Bye();
+  cell.Stop();
+  EXPECT_EQ(cell.robot.zeroed, 1);
+  EXPECT_EQ(cell.ends.at(0), SessionEnd::kBye);
+}
+
+TEST(WireSession, TheNumbersOnlyFormDrivesTheSameRobot) {
+  Cell cell;
+  RemoteOptions options;
+  options.form = WireForm::kNumbers;
+  RemoteRobot remote(cell.Dial(), options);
+  remote.Start();
+  EXPECT_NEAR(remote.Guarded(Down()).travelled_m, 0.05, 1e-9);
+  CompliantMotion spiral;
+  for (int i = 1; i <= 10; ++i) spiral.world_T_tool.push_back(MakePose(Eigen::Vector3d(0.001 * i, 0.0, 0.05)));
+  const MotionResult pieces = remote.Compliant(spiral);
+  EXPECT_EQ(pieces.reason, StopReason::kReached);
+  EXPECT_NEAR(pieces.world_T_tool.translation().x(), 0.01, 1e-9);
+}
+
+TEST(WireSession, NothingMovesBeforeTheStart) {
+  Cell cell;
+  const auto remote = cell.Remote();
+  const MotionResult refused = remote->Guarded(Down());
+  EXPECT_EQ(refused.reason, StopReason::kUnplanned);
+  EXPECT_NE(refused.detail.find("not started"), std::string::npos) << refused.detail;
+  remote->Start();
+  EXPECT_EQ(remote->Guarded(Down()).reason, StopReason::kReached);
+  cell.Stop();
+  EXPECT_EQ(cell.server->statistics().refused_motions, 1);
+  EXPECT_EQ(cell.server->statistics().motions, 1);
+}
+
+TEST(WireSession, WrongTokenVersionAndUnitsAreToldApart) {
+  ServerOptions options;
+  options.token = "secret";
+  Cell cell(options);
+  const auto code = [&](const std::string& hello) {
+    Connection connection = cell.Dial();
+    const std::string reply = Ask(connection, hello);
+    return std::get<ErrorReply>(DecodeReply(WireForm::kJson, reply).body).code;
+  };
+  EXPECT_EQ(code(Hello("wrong")), "token");
+  EXPECT_EQ(code(Hello("")), "token");
+  EXPECT_EQ(code(Hello("secrets")), "token");
+  EXPECT_EQ(code(Hello("secret", 2)), "version");
+  EXPECT_EQ(code(Hello("secret", 1, "mm kg s deg N")), "units");
+  EXPECT_EQ(code(Line(1, StateRequest{})), "sequence");
+  EXPECT_EQ(code("GET / HTTP/1.1"), "malformed");
+  EXPECT_THROW(cell.Remote("wrong"), InputError);
+  cell.Remote("secret")->Start();
+  cell.Stop();
+  EXPECT_EQ(cell.robot.moved_steps, 0);
+}
+
+TEST(WireSession, WhatIsOutOfSequenceOrNotSoundEndsItAndMovesNothing) {
+  const std::vector<std::string> bad = {Line(1, Down()),          Line(2, Down()),         Line(4, Down()),
+                                        Line(1000000, Down()),    "{\"type\":\"guarded\"", "(7,3,0,0,-1,0.05,0.05,5)",
+                                        std::string(300000, 'x'), Line(3, HelloRequest{})};
+  for (const std::string& line : bad) {
+    Cell cell;
+    Connection connection = cell.Dial();
+    Ask(connection, Hello());
+    Ask(connection, Line(1, StartRequest{}));
+    Ask(connection, Line(2, StateRequest{}));
+    const std::string reply = Ask(connection, line);
+    if (line != bad.back()) {
+      EXPECT_NE(reply.find("\"error\""), std::string::npos) << line.substr(0, 60) << reply;
+    }
+    connection.Write(Line(3, Down()) + "\n");  // too late: the session is over
+    cell.Stop();
+    if (line != bad.back()) {
+      EXPECT_EQ(cell.robot.moved_steps, 0) << line.substr(0, 60);
+    }
+  }
+}
+
+TEST(WireSession, OneAtATime) {
+  Cell cell;
+  const auto first = cell.Remote();
+  first->Start();
+  EXPECT_THROW(cell.Remote(), Error);
+  EXPECT_EQ(first->Guarded(Down()).reason, StopReason::kReached);
+}
+
+TEST(WireSession, ALinkThatBreaksInAMotionBringsTheRobotToRest) {
+  Cell cell;
+  Connection connection = cell.Dial();
+  Ask(connection, Hello());
+  Ask(connection, Line(1, StartRequest{}));
+  cell.robot.each_step = [&] {
+    if (cell.robot.moved_steps == 50) connection.Shutdown();
+  };
+  connection.Write(Line(2, Down(0.09)) + "\n");
+  while (cell.ends.empty() && cell.server->statistics().lost_links == 0) std::this_thread::yield();
+  cell.Stop();
+  EXPECT_GE(cell.robot.moved_steps, 50);
+  EXPECT_LT(cell.robot.moved_steps, 50 + 110) << "of 1800: at rest within the time of a lost link";
+  EXPECT_EQ(cell.ends.at(0), SessionEnd::kLost);
+}
+
+TEST(WireSession, AStopIsHeardInAMotion) {
+  Cell cell;
+  Connection connection = cell.Dial();
+  Ask(connection, Hello());
+  Ask(connection, Line(1, StartRequest{}));
+  cell.robot.each_step = [&] {
+    if (cell.robot.moved_steps == 50) connection.Write(Line(3, StopRequest{}) + "\n");
+  };
+  const auto reply = DecodeReply(WireForm::kJson, Ask(connection, Line(2, Down(0.09)))).body;
+  EXPECT_EQ(std::get<ResultReply>(reply).result.reason, StopReason::kAborted);
+  EXPECT_EQ(std::get<ResultReply>(reply).result.detail, "stopped by order");
+  EXPECT_LT(cell.robot.moved_steps, 200);
+}
+
+TEST(WireSession, MotionsOutsideOfTheCapabilitiesAreRefused) {
+  Cell cell;
+  const auto remote = cell.Remote();
+  remote->Start();
+  EXPECT_EQ(remote->LinearMove(MakePose(Eigen::Vector3d(3.0, 0.0, 0.1)), 0.1, 5.0).reason, StopReason::kUnplanned);
+  EXPECT_EQ(remote->LinearMove(MakePose(Eigen::Vector3d(0.1, 0.0, 0.1)), 1.5, 5.0).reason, StopReason::kUnplanned);
+  CompliantMotion hard;
+  hard.world_T_tool = {MakePose(Eigen::Vector3d(0.0, 0.0, 0.05))};
+  hard.force_limit_n = 500.0;
+  EXPECT_EQ(remote->Compliant(hard).reason, StopReason::kUnplanned);
+  EXPECT_EQ(remote->FollowTwist({}).reason, StopReason::kUnplanned);
+  cell.Stop();
+  EXPECT_EQ(cell.robot.moved_steps, 0);
+}
+
+TEST(WireFaults, NonsenseEndsTheSessionAndNoFurtherMotionIsSent) {
+  for (const WireFault fault : {WireFault::kDrop, WireFault::kMalformed, WireFault::kHalf, WireFault::kNan,
+                                WireFault::kBackwards, WireFault::kJump, WireFault::kProtective}) {
+    ServerOptions options;
+    options.faults.share[static_cast<int>(fault)] = 1.0;
+    Cell cell(options, true);
+    const auto remote = cell.Remote();
+    remote->Start();
+    remote->BeginEpisode(3);
+    int good = 0;
+    MotionResult ended;
+    for (int i = 0; i < 20; ++i) {
+      ended = remote->Guarded(
+          {i % 2 == 0 ? Eigen::Vector3d(Eigen::Vector3d::UnitX()) : -Eigen::Vector3d::UnitX(), 0.015, 0.05, 5.0});
+      if (ended.reason != StopReason::kReached) break;
+      ++good;
+    }
+    EXPECT_LT(good, 12) << ToString(fault);
+    EXPECT_EQ(ended.reason, StopReason::kAborted) << ToString(fault) << ended.detail;
+    const MotionResult next = remote->Guarded(Down());
+    EXPECT_NE(next.reason, StopReason::kReached) << ToString(fault);
+    if (fault == WireFault::kProtective) {
+      EXPECT_NE(ended.detail.find("protective stop"), std::string::npos);
+      remote->Recover();
+      EXPECT_EQ(remote->Guarded(Down()).reason, StopReason::kReached);
+    } else {
+      EXPECT_NE(ended.detail.find("link lost"), std::string::npos) << ToString(fault) << ended.detail;
+    }
+    cell.Stop();
+    const int motions = good + (fault == WireFault::kProtective ? 2 : 1);
+    EXPECT_EQ(cell.server->statistics().motions, motions) << ToString(fault);
+    EXPECT_EQ(cell.server->statistics().ordered[static_cast<int>(fault)], 1) << ToString(fault);
+  }
+}
+
+TEST(WireFaults, ARobotOfAnotherVersionIsNotDriven) {
+  ServerOptions options;
+  options.faults.share[static_cast<int>(WireFault::kVersion)] = 1.0;
+  Cell cell(options);
+  EXPECT_THROW(cell.Remote(), InputError);
+}
+
+TEST(WireFaults, NamesAndNumbersAreChecked) {
+  EXPECT_EQ(ParseOrderedFaults("latency=2,drop=0.5").latency_s, 0.002);
+  for (const char* bad : {"drops=1", "drop", "drop=2", "drop=x", "latency=-1", "slowed=0", "=1"}) {
+    EXPECT_THROW(ParseOrderedFaults(bad), InputError) << bad;
+  }
+}
+
+TEST(WireFuzz, NoFrameMovesARobot) {
+  const std::vector<std::string> seeds = {
+      Hello(),  Line(1, StartRequest{}),    Line(1, Down()),           Line(2, Down()), "(1,0,1,0)",
+      "(11,1)", "(7,1,0,0,-1,0.01,0.05,5)", "(7,2,0,0,-1,0.01,0.05,5)"};
+  Cell cell;
+  std::mt19937 random(5);
+  constexpr int kSessions = 60;
+  for (int session = 0; session < kSessions; ++session) {
+    Connection connection = cell.Dial();
+    if (session % 2 == 0) connection.Write(Hello() + "\n");
+    // Starts are left out: without one every motion is refused, however sound the frame.
+    for (int i = 0; i < 20; ++i) {
+      std::string line = seeds[random() % seeds.size()];
+      if (line.find("start") != std::string::npos || line == "(11,1)") continue;
+      if (random() % 3 == 0 && !line.empty()) line[random() % line.size()] = static_cast<char>(random() % 256);
+      connection.Write(line + (random() % 10 == 0 ? "" : "\n"));
+    }
+  }
+  cell.Stop();
+  EXPECT_EQ(cell.robot.moved_steps, 0);
+}
+
+TEST(WireChecks, AMotionOutsideOfTheLimitsIsNotSent) {
+  const auto refusal = [](const std::function<void(SafetyLimits&)>& limit,
+                          const std::function<MotionResult(Robot&)>& move) {
+    PointRobot robot;
+    SafetyLimits limits;
+    limits.robot.max_speed_m_s = 0.5;
+    limit(limits);
+    CheckedRobot checked(robot, limits);
+    const MotionResult result = move(checked);
+    const bool still = robot.moved_steps == 0;
+    EXPECT_EQ(result.reason == StopReason::kUnplanned, still);
+    EXPECT_EQ(checked.Guarded(Down(0.001)).reason == StopReason::kUnplanned, still) << "it goes on after a refusal";
+    return checked.refusal();
+  };
+  const auto none = [](SafetyLimits&) {};
+  const auto down = [](Robot& robot) { return robot.Guarded(Down()); };
+  EXPECT_EQ(refusal(none, down), "");
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.box.min_m.z() = 0.06; }, down).find("workspace box"), std::string::npos);
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.force_budget_n = 4.0; }, down).find("force budget"), std::string::npos);
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.robot.max_speed_m_s = 0.04; }, down).find("above what the robot states"),
+            std::string::npos);
+  EXPECT_EQ(refusal(
+                [](SafetyLimits& l) {
+                  l.robot.max_speed_m_s = 0.04;
+                  l.speed_scale = 0.5;
+                },
+                down),
+            "");
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.way_fault = [](const Pose&, const Pose&) { return "singular"; }; }, down)
+                .find("singular"),
+            std::string::npos);
+  const auto through = [](Robot& robot) {
+    CompliantMotion motion;
+    motion.world_T_tool = {MakePose(Eigen::Vector3d(0.0, 0.5, 0.1)), MakePose(Eigen::Vector3d(0.0, 0.0, 0.09))};
+    return robot.Compliant(motion);
+  };
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.box.max_m.y() = 0.4; }, through).find("workspace box"), std::string::npos)
+      << "a way point between the ends counts";
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.most_compliant_n = 50.0; }, through).find("force limit"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace feeler::execution
