@@ -18,5 +18,6 @@ void AddExportCommand(CLI::App& app, Session& session);
 void AddPolicyCommand(CLI::App& app, Session& session);
 void AddExperimentCommand(CLI::App& app, Session& session);
 void AddReportCommand(CLI::App& app, Session& session);
+void AddRecordsCommand(CLI::App& app, Session& session);
 
 }  // namespace feeler::cli

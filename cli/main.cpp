@@ -4,14 +4,17 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "feeler/cli/commands.h"
 #include "feeler/cli/common/console.h"
@@ -20,10 +23,15 @@
 #include "feeler/core/file_output.h"
 #include "feeler/core/interrupted.h"
 #include "feeler/version.h"
+#include "feeler/workflow/scale/ranks.h"
+#ifdef FEELER_HAS_MPI
+#include "feeler/workflow/scale/mpi/mpi_ranks.h"
+#endif
 
 namespace {
 
 feeler::CancellationToken cancellation;  // reached from the signal handler
+feeler::workflow::Ranks* ranks = nullptr;
 
 /// CLI11 says of an unknown command that one is required; we name it and list the known.
 void RequireKnownCommands(CLI::App& app, int argc, char** argv) {
@@ -46,6 +54,10 @@ void RequireKnownCommands(CLI::App& app, int argc, char** argv) {
 }
 
 int Fail(std::string_view message, int code) {
+  if (ranks != nullptr && ranks->rank() > 0) {
+    ranks->Fail(std::string(message), code);
+    return 0;  // rank 0 tells and ends with the code
+  }
   feeler::cli::Note("feeler: error: {}\n", message);
   return code;
 }
@@ -109,6 +121,35 @@ int Explain() {
                       "give fewer --jobs or raise the limit (ulimit -u, ulimit -v)"));
 }
 
+/// The processes that were started with this one, for the commands that use them; null where it is alone.
+std::unique_ptr<feeler::workflow::Ranks> ConnectRanks(int argc, char** argv) {
+  const int count = feeler::workflow::LaunchedRanks();
+  const std::vector<std::string_view> words(argv + 1, argv + argc);
+  const auto has = [&](std::string_view word) {
+    return std::any_of(words.begin(), words.end(), [&](std::string_view w) {
+      return w == word || (w.starts_with(word) && w.substr(word.size()).starts_with("="));
+    });
+  };
+  if (count <= 1 || has("--shard") || has("--estimate")) return nullptr;
+  if (feeler::workflow::LaunchedRank() > 0) {
+    feeler::cli::Mute();
+    feeler::cli::EndSilently();
+  }
+  if (words.empty() || has("--help") || has("--version")) return nullptr;
+  const std::string_view command = words.front();
+  if (command != "preprocess" && command != "run" && command != "experiment" && command != "assemble" &&
+      !(command == "perceive" && has("calibrate"))) {
+    throw feeler::InputError("ranks", fmt::format("{} ranks were started, feeler {} runs on one", count, command),
+                             "start it without mpirun");
+  }
+#ifdef FEELER_HAS_MPI
+  return feeler::workflow::ConnectMpiRanks(cancellation);
+#else
+  throw feeler::InputError("ranks", "this feeler was built without MPI",
+                           "install libopenmpi-dev and openmpi-bin and build it again, or give --shard auto");
+#endif
+}
+
 /// The exit code of the command itself.
 int Run(CLI::App& app, const feeler::cli::Session& session, int argc, char** argv) {
   try {
@@ -133,7 +174,16 @@ int main(int argc, char** argv) {
   std::set_terminate(OnTerminate);
   feeler::cli::CancelOnSignals(cancellation);
 
-  feeler::cli::Session session{&cancellation};
+  std::unique_ptr<feeler::workflow::Ranks> connection;
+  try {
+    connection = ConnectRanks(argc, argv);
+  } catch (...) {
+    return Explain();
+  }
+  ranks = connection.get();
+  feeler::cli::Session session;
+  session.cancellation = &cancellation;
+  session.ranks = ranks;
   CLI::App app{"Feeler plans and executes high-precision insertions by touch.", "feeler"};
   app.set_version_flag("--version", std::string("feeler ") + FEELER_VERSION);
   app.require_subcommand(1);
@@ -149,6 +199,7 @@ int main(int argc, char** argv) {
   feeler::cli::AddPolicyCommand(app, session);
   feeler::cli::AddExperimentCommand(app, session);
   feeler::cli::AddReportCommand(app, session);
+  feeler::cli::AddRecordsCommand(app, session);
 
   const int code = Run(app, session, argc, argv);
   const std::string_view lost = feeler::cli::ResultsLost();
