@@ -4,9 +4,8 @@
 #define MPICH_SKIP_MPICXX 1
 #include <mpi.h>
 
-#include <chrono>
+#include <iterator>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "feeler/core/error.h"
@@ -50,10 +49,6 @@ bool MpiPost::Settle() {
     it = done != 0 ? sending_.erase(it) : std::next(it);
   }
   return sending_.empty();
-}
-
-void MpiPost::Drain() {
-  for (int i = 0; i < 1000 && !Settle(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 }  // namespace feeler::workflow

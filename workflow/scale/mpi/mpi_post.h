@@ -6,7 +6,7 @@
 namespace feeler::workflow {
 
 /// What a message is about.
-enum class MessageKind : int { kGreeting = 1, kWelcome, kRequest, kAnswer, kFailure, kCancel, kEnd };
+enum class MessageKind : int { kGreeting = 1, kWelcome, kRequest, kAnswer, kFailure, kCancel, kEnd, kGoodbye };
 
 struct Message {
   MessageKind kind = MessageKind::kEnd;
@@ -18,7 +18,6 @@ struct Message {
 class MpiPost {
  public:
   MpiPost() = default;
-  ~MpiPost() { Drain(); }
   MpiPost(const MpiPost&) = delete;
   MpiPost& operator=(const MpiPost&) = delete;
 
@@ -29,7 +28,6 @@ class MpiPost {
   bool Settle();
 
  private:
-  void Drain();
   struct Sending {
     std::string bytes;
     void* request = nullptr;  ///< MPI_Request

@@ -35,6 +35,9 @@ constexpr auto kLongNap = microseconds(1000);
 /// After a cancellation, for answers that are nearly there. Signals end a process 1.5 s after they came.
 constexpr auto kGrace = std::chrono::milliseconds(1000);
 
+/// For the others to go once rank 0 has said so: they finish what cannot be cancelled, an episode.
+constexpr auto kPatience = std::chrono::seconds(20);
+
 double ProcessCpuSeconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -232,6 +235,8 @@ class MpiRanks final : public Ranks {
       cancellation_.Cancel();
       work_.notify_all();
     }
+    workers.clear();
+    SayGoodbye();
   }
 
   void Fail(const std::string& message, int exit_code) override {
@@ -239,7 +244,7 @@ class MpiRanks final : public Ranks {
     Nap nap;
     while (true) {  // until rank 0 has had a chance to tell
       Message end;
-      if (post_.Receive(end) && end.kind == MessageKind::kEnd) return;
+      if (post_.Receive(end) && end.kind == MessageKind::kEnd) return SayGoodbye();
       post_.Settle();
       std::this_thread::sleep_for(nap.Next());
     }
@@ -314,8 +319,25 @@ class MpiRanks final : public Ranks {
       pump_.join();
     }
     for (int i = 1; i < size_; ++i) post_.Send({MessageKind::kEnd, i, ""});
-    Message unread;
-    for (Nap nap; !post_.Settle(); std::this_thread::sleep_for(nap.Next())) post_.Receive(unread);
+    Nap nap;
+    const auto give_up = steady_clock::now() + kPatience;
+    for (int present = size_ - 1; (present > 0 || !post_.Settle()) && steady_clock::now() < give_up;) {
+      Message message;
+      if (!post_.Receive(message)) {
+        std::this_thread::sleep_for(nap.Next());
+      } else if (message.kind == MessageKind::kGoodbye) {
+        --present;
+      }
+    }
+  }
+
+  /// Another rank: nothing follows.
+  void SayGoodbye() {
+    SendAll();
+    post_.Send({MessageKind::kGoodbye, 0, ""});
+    Nap nap;
+    const auto give_up = steady_clock::now() + kPatience;
+    while (!post_.Settle() && steady_clock::now() < give_up) std::this_thread::sleep_for(nap.Next());
   }
 
   /// Another rank: what has come from rank 0. True if that was the last.
