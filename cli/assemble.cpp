@@ -15,8 +15,11 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/interrupted.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/evaluation/records/statistics.h"
+#include "feeler/policies/storage/database.h"
+#include "feeler/version.h"
 #include "feeler/workflow/assembly/assembly_builds.h"
 #include "feeler/workflow/assembly/assembly_video.h"
 
@@ -128,9 +131,25 @@ void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
   }
 }
 
-void Run(const Flags& flags, Session& session) {
-  RequireSane(flags);
-  const Parallelism jobs = Parallelism(flags.jobs);
+/// What all ranks must agree on.
+std::string RankIdentity(const Flags& flags) {
+  nlohmann::json json = {{"command", "assemble"},
+                         {"version", FEELER_VERSION},
+                         {"assembly", flags.assembly},
+                         {"seed", flags.seed},
+                         {"ladder", !flags.no_ladder}};
+  for (const std::string& file : flags.databases) {
+    json["content of the databases"].push_back(policies::Database::OpenReadOnly(file).ContentDigest());
+  }
+  return json.dump();
+}
+
+void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  if (!session.serves()) RequireSane(flags);
+  if (session.ranks != nullptr && (flags.check || !flags.video.empty() || !flags.render.empty())) {
+    throw InputError("ranks", "a check, a picture and a video are work for one", "start it without mpirun");
+  }
+  const Parallelism jobs = JobsOf(command, flags.jobs, session);
   const std::uint64_t seed = flags.seed;
   const workflow::Assembly assembly = workflow::LoadAssembly(flags.assembly);
   ProgressBar check_bar("checking");
@@ -142,20 +161,28 @@ void Run(const Flags& flags, Session& session) {
     return;
   }
   ProgressBar map_bar("contact map");
-  const workflow::AssemblyTasks tasks =
-      workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session));
+  std::optional<workflow::AssemblyTasks> loaded;
+  session.OncePerHost([&] {
+    loaded = workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session));
+  });
+  const workflow::AssemblyTasks& tasks = *loaded;
   map_bar.Finish();
 
-  std::optional<OutputFile> out;
-  if (!flags.out.empty()) out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
-  workflow::AssemblyFilm film;
-  film.period_s = flags.video_speed / 25.0;
   workflow::AssemblyOptions options;
   options.seed = seed;
   options.ladder = !flags.no_ladder;
   options.cancellation = session.cancellation;
+  if (session.serves()) {
+    workflow::ServeAssemblies(assembly, plan, tasks, options, jobs, *session.ranks, RankIdentity(flags));
+    return;
+  }
+  if (session.ranks != nullptr) session.ranks->Assemble(RankIdentity(flags));
+  std::optional<OutputFile> out;
+  if (!flags.out.empty()) out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+  workflow::AssemblyFilm film;
+  film.period_s = flags.video_speed / 25.0;
   if (!flags.video.empty()) options.film = &film;
-  ProgressBar bar("insertions");
+  ProgressBar bar(WithRanks(session.ranks != nullptr ? "builds" : "insertions", session));
   std::vector<workflow::AssemblyRecord> records;
   const auto on_record = [&](const workflow::AssemblyRecord& record) {
     records.push_back(record);
@@ -163,9 +190,21 @@ void Run(const Flags& flags, Session& session) {
       if (out) out->Write(line.dump() + "\n");
     }
   };
+  const auto on_lines = [&](const std::vector<std::string>& lines) {
+    records.push_back(workflow::SummaryRecord(lines));
+    for (const std::string& line : lines) {
+      if (out) out->Write(line + "\n");
+    }
+    bar.Update(static_cast<std::int64_t>(records.size()), flags.builds);
+  };
+  const int builds = static_cast<int>(flags.builds);
   try {
-    workflow::BuildAssemblies(assembly, plan, tasks, options, static_cast<int>(flags.builds), jobs, on_record,
-                              bar.Callback());
+    if (session.ranks != nullptr) {
+      workflow::BuildAssembliesOnRanks(assembly, plan, tasks, options, builds, jobs, *session.ranks, on_lines);
+    } else {
+      workflow::BuildAssemblies(assembly, plan, tasks, options, builds, jobs, on_record, bar.Callback());
+    }
+  } catch (const Interrupted&) {  // NOLINT(bugprone-empty-catch): by ranks that did not end in time
   } catch (const InputError&) {  // of the output: what is there is cut off
     throw;
   } catch (...) {  // of the world or the machine: what is done is kept
@@ -178,6 +217,7 @@ void Run(const Flags& flags, Session& session) {
     ProgressBar video_bar("video frames");
     workflow::WriteAssemblyVideo(assembly, film, records.front(), flags.video, Interruptible(video_bar, session));
   }
+  NoteRanks(session, static_cast<std::int64_t>(records.size()));
   PrintSummary(flags, assembly, records);
   const bool one_stopped = flags.builds == 1 && !records.empty() && !records.front().complete;
   if (one_stopped || session.cancellation->cancelled()) session.exit_code = 1;
@@ -204,7 +244,7 @@ void AddAssembleCommand(CLI::App& app, Session& session) {
   command->add_flag("--check", flags->check, "check the assembly and print what is drawn; builds nothing");
   command->add_flag("--no-ladder", flags->no_ladder, "no fallbacks, and no second attempt");
   command->add_flag("--json", flags->json, "print the summary as JSON");
-  command->callback([flags, &session] { Run(*flags, session); });
+  command->callback([command, flags, &session] { Run(*command, *flags, session); });
 }
 
 }  // namespace feeler::cli

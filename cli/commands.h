@@ -21,5 +21,6 @@ void AddReportCommand(CLI::App& app, Session& session);
 void AddSimulateCommand(CLI::App& app, Session& session);
 void AddExecuteCommand(CLI::App& app, Session& session);
 void AddCellCommand(CLI::App& app, Session& session);
+void AddRecordsCommand(CLI::App& app, Session& session);
 
 }  // namespace feeler::cli

@@ -20,6 +20,7 @@
 #include "feeler/env/model/task_file.h"
 #include "feeler/execution/contact/executor_options.h"
 #include "feeler/planner/policy/evaluate.h"
+#include "feeler/policies/storage/merge.h"
 #include "feeler/workflow/setup/bundle.h"
 #include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
@@ -109,6 +110,12 @@ void Info(const Flags& flags) {
     json["cost_unit"] = workflow::CostUnit(identity);
     json["settings"] = nlohmann::json::parse(identity.settings);
     json["created_by"] = identity.created_by;
+    if (identity.shard) {
+      json["shard"] = {{"index", identity.shard->index},
+                       {"count", identity.shard->count},
+                       {"problems", identity.shard->problems},
+                       {"family", identity.shard->family}};
+    }
     json["content_digest"] = database.ContentDigest();
     PrintJson(json);
     return;
@@ -116,6 +123,10 @@ void Info(const Flags& flags) {
   Print("task                {} ({})\n", identity.task, identity.fingerprint);
   Print("opening, goal       {}, {}\n", identity.opening, identity.goal);
   Print("settings            {}\n", identity.settings);
+  if (identity.shard) {
+    Print("shard               {} of {}: {} of the {} problems of the family\n", identity.shard->index,
+          identity.shard->count, identity.shard->problems, identity.shard->family);
+  }
   const CostWeights& cost = identity.cost;
   const std::string per_cell = cost.one_per_cell() ? fmt::format("{:g} a cell", cost.per_cell)
                                                    : fmt::format("{:g}, {:g}, {:g} a cell along x, y, z",
@@ -207,6 +218,34 @@ void Export(const Flags& flags) {
   WritePolicy(problem, *stored.policy, setup.task().name, flags.out);
 }
 
+struct MergeFlags {
+  std::vector<std::string> files;
+  std::string out;
+  bool json = false;
+};
+
+void Merge(const MergeFlags& flags, const Session& session) {
+  RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, flags.files);
+  ProgressBar bar("merging");
+  const policies::MergeSummary summary =
+      policies::MergeDatabases(flags.files, flags.out, bar.Callback(), session.cancellation);
+  bar.Finish();
+  if (flags.json) {
+    PrintJson({{"files", summary.files}, {"problems", summary.problems}, {"content_digest", summary.digest}});
+  } else {
+    Print("{}: {} problems of {} files, content {}\n", flags.out, summary.problems, summary.files, summary.digest);
+  }
+}
+
+void AddMerge(CLI::App& db, const Session& session) {
+  auto flags = std::make_shared<MergeFlags>();
+  CLI::App* command = db.add_subcommand("merge", "Put the shards of a family together");
+  command->add_option("files", flags->files, "databases: all shards of a family, or disjoint families")->required();
+  command->add_option("--out", flags->out, "database to write; one that exists is not overwritten")->required();
+  command->add_flag("--json", flags->json, "print JSON");
+  command->callback([flags, &session] { Merge(*flags, session); });
+}
+
 void Bundle(const Flags& flags) {
   const policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
@@ -255,6 +294,7 @@ void AddDbCommand(CLI::App& app, Session& session) {
     add_task(command, flags);
     command->callback([flags = flags, &session] { Verify(*flags, session); });
   }
+  AddMerge(*db, session);
   {
     auto [command, flags] = add("bundle", "Write what an executor without a simulator needs of the task: FILE.bundle");
     add_task(command, flags);

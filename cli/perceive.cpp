@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "feeler/cli/commands.h"
 #include "feeler/cli/common/console.h"
@@ -41,6 +42,8 @@ struct CalibrateFlags {
   int poses = 1000;
   int installations = 5;
   int frames = 10;
+  std::string shard;
+  std::vector<std::string> from;
   std::uint64_t seed = 1;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
@@ -113,22 +116,38 @@ std::string ErrorLine(const char* name, const workflow::ErrorSummary& errors) {
                      kDegree * errors.yaw_p95_rad, errors.gross);
 }
 
-void Calibrate(const CalibrateFlags& flags, Session& session) {
+void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& session) {
   workflow::CalibrationOptions options;
   options.poses = flags.poses;
   options.installations = flags.installations;
   options.seed = flags.seed;
-  options.jobs = Parallelism(flags.jobs);
+  options.jobs = JobsOf(command, flags.jobs, session);
+  options.shard = ShardOf(flags.shard);
+  options.from = flags.from;
+  options.ranks = session.ranks;
   options.perception.averaged_frames = flags.frames;
-  if (IsReplaceable(flags.out)) options.partial = flags.out + ".partial.jsonl";
+  if (options.shard) {
+    options.partial = flags.out;
+  } else if (IsReplaceable(flags.out)) {
+    options.partial = flags.out + ".partial.jsonl";
+  }
   options.cancellation = session.cancellation;
   options.Validate();
-  RequireOutputs({{"--out", flags.out, FileKind::kTable}}, InputsOfTask(flags.task));
+  std::vector<std::string> inputs = InputsOfTask(flags.task);
+  inputs.insert(inputs.end(), flags.from.begin(), flags.from.end());
+  if (!session.serves() && !options.shard) RequireOutputs({{"--out", flags.out, FileKind::kTable}}, inputs);
   const env::TaskModel model = env::LoadTask(flags.task);
-  ProgressBar bar("poses");
+  if (session.serves()) return workflow::ServeCalibration(model, options);
+  ProgressBar bar(WithRanks("poses", session));
   options.progress = bar.Callback();
   const workflow::Calibration calibration = workflow::Calibrate(model, options);
   bar.Finish();
+  NoteRanks(session, static_cast<std::int64_t>(calibration.samples.size()));
+  if (options.shard && !session.cancellation->cancelled()) {
+    Note("shard {} of {}: {} poses in {}; give all shards to feeler perceive calibrate --from\n", options.shard->index,
+         options.shard->count, calibration.samples.size(), flags.out);
+    return;
+  }
   if (!calibration.complete) {
     Note("interrupted after {} of {} poses; run the same command again to go on\n", calibration.samples.size(),
          2 * flags.poses);
@@ -174,8 +193,10 @@ void AddPerceiveCommand(CLI::App& app, Session& session) {
   AddInteger(*nested, "--frames", calibrate->frames, 1, 1000, "averaged for a picture");
   AddSeed(*nested, calibrate->seed, "of all draws");
   AddJobs(*nested, calibrate->jobs, "threads; the table does not depend on it");
+  AddShard(*nested, calibrate->shard, "the poses, into the file of --out");
+  nested->add_option("--from", calibrate->from, "what shards of this calibration wrote: the poses that it begins with");
   nested->add_flag("--json", calibrate->json, "print the report as JSON");
-  nested->callback([calibrate, &session] { Calibrate(*calibrate, session); });
+  nested->callback([nested, calibrate, &session] { Calibrate(*nested, *calibrate, session); });
   command->callback([flags, command] {
     if (command->get_subcommands().empty()) Perceive(*flags);
   });

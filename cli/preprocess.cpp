@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "feeler/cli/commands.h"
@@ -16,6 +17,10 @@
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/policies/io/problem_family_file.h"
 #include "feeler/workflow/perception/perceive_table.h"
+#include "feeler/workflow/scale/estimate.h"
+#include "feeler/workflow/scale/job_model.h"
+#include "feeler/workflow/scale/problem_wire.h"
+#include "feeler/workflow/scale/shard.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -29,6 +34,10 @@ struct Flags {
   std::string cost = "distance";
   std::string order = "uncertainty";
   std::string experience = "rollout";
+  std::string shard;
+  bool estimate = false;
+  int ranks = 1;
+  int sample = 64;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
   SolverFlags solver;
@@ -45,11 +54,78 @@ planner::ProblemFamily FamilyFor(const std::string& text, const workflow::Planni
   return planner::ParseProblemFamily(text, task);
 }
 
+/// What all ranks must agree on.
+std::string RankIdentity(const workflow::PlanningSetup& setup, const planner::ProblemFamily& family,
+                         const planner::PreprocessOptions& options) {
+  const policies::DatabaseIdentity identity = workflow::IdentityOf(setup, options);
+  return nlohmann::json{{"command", "preprocess"},
+                        {"version", identity.created_by},
+                        {"task", identity.task},
+                        {"fingerprint of the task", identity.fingerprint},
+                        {"opening", identity.opening},
+                        {"settings", identity.settings},
+                        {"family", workflow::DatabaseShardOf(family, {}).digest}}
+      .dump();
+}
+
+planner::PreprocessOptions OptionsOf(const workflow::PlanningSetup& setup, planner::PreprocessOptions options) {
+  options.openings = setup.opening == env::Opening::kOpen;
+  return options;
+}
+
+void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily& family,
+              planner::PreprocessOptions options, const Flags& flags) {
+  if (options.solver.solver == planner::SolverKind::kERtdpBel &&
+      options.experience != planner::ExperienceKind::kNone) {
+    throw InputError("--estimate", "what e-rtdp-bel takes depends on the experience, which a sample does not have",
+                     "give --experience none, or another --solver");
+  }
+  ProgressBar bar("sample");
+  options.progress = bar.Callback();
+  const workflow::FamilyEstimate estimate = workflow::EstimateFamily(setup, family, options, flags.sample);
+  bar.Finish();
+  const workflow::JobModel model = workflow::ModelOf(estimate);
+  const workflow::JobForecast alone = workflow::Simulate(model, 1);
+  const workflow::JobForecast many = workflow::Simulate(model, flags.ranks);
+  if (flags.json) {
+    PrintJson({{"problems", estimate.problems},
+               {"sampled", estimate.sampled},
+               {"sample_cpu_s", estimate.sample_cpu_s},
+               {"cpu_s", estimate.cpu_s},
+               {"cpu_error", estimate.cpu_error},
+               {"tables_s", estimate.tables_s},
+               {"memory_per_rank_bytes", estimate.rank_bytes},
+               {"memory_bytes", estimate.rank_bytes * flags.ranks},
+               {"commit_s", estimate.commit_s},
+               {"ranks", flags.ranks},
+               {"wall_s", many.wall_s},
+               {"wall_one_rank_s", alone.wall_s},
+               {"efficiency", many.efficiency},
+               {"longest_s", many.longest_s},
+               {"committing_s", many.committing_s}});
+    return;
+  }
+  Print("problems            {}, {} of them solved for this estimate in {:.1f} s CPU\n", estimate.problems,
+        estimate.sampled, estimate.sample_cpu_s);
+  Print("CPU time            {:.0f} s, +- {:.0f} % (one half of the sample about the other)\n", estimate.cpu_s,
+        100 * estimate.cpu_error);
+  Print("tables              {:.1f} s CPU, once a rank\n", estimate.tables_s);
+  Print("memory              {:.0f} MB a rank, {:.1f} GB for {}\n", static_cast<double>(estimate.rank_bytes) / 1e6,
+        static_cast<double>(estimate.rank_bytes) * flags.ranks / 1e9, flags.ranks);
+  Print("wall time           {:.0f} s on 1 rank, {:.0f} s on {} (efficiency {:.2f})\n", alone.wall_s, many.wall_s,
+        flags.ranks, many.efficiency);
+  Print("limits              longest problem {:.2f} s; rank 0 commits for {:.1f} s\n", many.longest_s,
+        many.committing_s);
+}
+
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  if (flags.out.empty() && !flags.estimate) {
+    throw InputError("--out", "missing", "give the database to write, or --estimate");
+  }
   planner::PreprocessOptions options;
   options.solver = flags.solver.Options(command);
   options.seed = options.solver.seed;
-  options.jobs = Parallelism(flags.jobs);
+  options.jobs = JobsOf(command, flags.jobs, session);
   options.cancellation = session.cancellation;
   if (flags.order == "random") {
     options.order = planner::ProblemOrder::kRandom;
@@ -57,9 +133,10 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     throw InputError("--order", "unknown value \"" + flags.order + "\"", "choose one of uncertainty, random");
   }
   options.experience = ParseExperience(flags.experience);
+  const std::optional<workflow::Shard> shard = ShardOf(flags.shard);
   std::vector<std::string> inputs = InputsOfTask(flags.task);
   inputs.push_back(flags.family);
-  RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, inputs);
+  if (!session.serves()) RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, inputs);
 
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
@@ -67,25 +144,45 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   setup_options.cost_kind = ParseCost(flags.cost);
   setup_options.jobs = options.jobs;
   setup_options.progress = Interruptible(map_bar, session);
-  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
+  workflow::PlanningSetup setup;
+  session.OncePerHost([&] { setup = workflow::LoadPlanningSetup(flags.task, setup_options); });
   map_bar.Finish();
   const planner::ProblemFamily family = FamilyFor(flags.family, setup);
   workflow::RequireWithinTask(family, setup.task());
 
   ProgressBar table_bar("tables");
   options.solver.on_tables = Interruptible(table_bar, session);
-  ProgressBar bar("problems");
+  ProgressBar bar(WithRanks("problems", session));
   options.progress = bar.Callback();
-  const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out);
+  if (flags.estimate) return Estimate(setup, family, options, flags);
+  if (session.ranks != nullptr) {
+    const std::string identity = RankIdentity(setup, family, options);
+    if (session.serves()) {
+      workflow::ServeProblems(*session.ranks, identity, setup.task(), setup.map, family, OptionsOf(setup, options));
+      return;
+    }
+    session.ranks->Assemble(identity);
+    options.distant = workflow::DistantSolvers(*session.ranks, family.problems.size());
+  }
+  std::optional<policies::DatabaseShard> part;
+  if (shard) {
+    options.only =
+        std::make_shared<const std::vector<planner::Extents>>(workflow::ProblemsOfShard(family, *shard));
+    part = workflow::DatabaseShardOf(family, *shard);
+  }
+  const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out, part);
   bar.Finish();
 
   const planner::PreprocessSummary& summary = build.summary;
   Note("{} problems: {} solved now, {} already there, {} failed; {:.1f} s wall, {:.1f} s CPU{}\n", summary.problems,
        summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
        summary.cancelled ? "; interrupted, run the same command again to go on" : "");
+  if (summary.helpers > 0) Note("{} problems of other shards solved for their policies\n", summary.helpers);
+  NoteRanks(session, summary.complete + summary.failed);
   if (flags.json) {
     nlohmann::json json = InfoJson(build.info);
     json["cost_unit"] = workflow::CostUnit(setup.cost_kind, setup.task().cost);
+    if (session.ranks != nullptr) json["ranks"] = RanksJson(session, summary.complete + summary.failed);
     PrintJson(json);
   } else {
     PrintInfo(build.info, workflow::CostUnit(setup.cost_kind, setup.task().cost));
@@ -99,7 +196,7 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   auto flags = std::make_shared<Flags>();
   CLI::App* command = app.add_subcommand("preprocess", "Build (or continue) the policy database of a task");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
-  command->add_option("--out", flags->out, "database file; an existing one is continued")->required();
+  command->add_option("--out", flags->out, "database file; an existing one is continued");
   command->add_option("--family", flags->family,
                       "problems, a range or count per axis of the task, e.g. 2..15x2..15x2..15, or a JSON file of them "
                       "or an uncertainty table "
@@ -110,6 +207,11 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
   command->add_option("--order", flags->order, "uncertainty or random (e-rtdp-bel)")->capture_default_str();
   command->add_option("--experience", flags->experience, "rollout, naive or none (e-rtdp-bel)")->capture_default_str();
   AddJobs(*command, flags->jobs, "threads; the content does not depend on it");
+  command->add_flag("--estimate", flags->estimate,
+                    "say what CPU, memory and wall time it will take, from a sample; writes nothing");
+  AddInteger(*command, "--ranks", flags->ranks, 1, 1'000'000, "that the estimate is for");
+  AddInteger(*command, "--sample", flags->sample, 2, 1'000'000, "problems that the estimate solves");
+  AddShard(*command, flags->shard, "the family, into a file of its own for feeler db merge");
   command->add_flag("--json", flags->json, "print the summary as JSON");
   flags->solver.AddTo(*command);
   command->callback([command, flags, &session] { Run(*command, *flags, session); });

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -19,18 +21,24 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/interrupted.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/evaluation/records/episode_json.h"
 #include "feeler/evaluation/records/fault_bands.h"
+#include "feeler/evaluation/records/merge_records.h"
 #include "feeler/evaluation/records/run_summary.h"
 #include "feeler/evaluation/records/scene_geometry.h"
+#include "feeler/policies/storage/hash.h"
+#include "feeler/version.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/episode_video.h"
 #include "feeler/workflow/perception/perceive_table.h"
 #include "feeler/workflow/setup/contact_speeds.h"
+#include "feeler/workflow/scale/ordered_pieces.h"
+#include "feeler/workflow/scale/shard.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -58,6 +66,7 @@ struct Flags {
   int jobs = 1;
   double confirm_limit_m = 0.0;  ///< 0: not given
   double force_budget_n = 0.0;   ///< 0: not given
+  std::string shard;
   bool no_ladder = false;
   bool withhold_true_pose = false;
   bool json = false;
@@ -145,9 +154,34 @@ nlohmann::json ContactJson(const workflow::ContactSpeeds& speeds) {
           {"speed_m_s", speeds.speed_m_s}};
 }
 
-void Run(const Flags& flags, Session& session) {
-  RequireSane(flags);
-  const Parallelism jobs = Parallelism(flags.jobs);
+/// Everything that shapes the records, beside the number of episodes: what ranks and shards must have in common.
+nlohmann::json SettingsJson(const Flags& flags, const workflow::PlanningSetup& setup, policies::Database* database) {
+  nlohmann::json settings = {{"command", "run"},
+                             {"version", FEELER_VERSION},
+                             {"task", setup.task().name},
+                             {"fingerprint of the task", setup.fingerprint},
+                             {"content of the database", database != nullptr ? database->ContentDigest() : ""},
+                             {"policy", flags.policy},
+                             {"policy_options", flags.policy_options},
+                             {"seed", flags.seed},
+                             {"extents", flags.extents},
+                             {"noise", flags.noise},
+                             {"placement", flags.placement},
+                             {"perception", flags.perception},
+                             {"ladder", !flags.no_ladder},
+                             {"confirm_limit_m", flags.confirm_limit_m},
+                             {"force_budget_n", flags.force_budget_n}};
+  if (!flags.table.empty()) {
+    std::ifstream in(flags.table, std::ios::binary);
+    settings["table"] = policies::HashText(std::string(std::istreambuf_iterator<char>(in), {}));
+  }
+  return settings;
+}
+
+void Run(const CLI::App& command, const Flags& flags, Session& session) {
+  if (!session.serves()) RequireSane(flags);
+  const Parallelism jobs = JobsOf(command, flags.jobs, session);
+  const std::optional<workflow::Shard> shard = ShardOf(flags.shard);
   const workflow::Placement placement = workflow::ParsePlacement(flags.placement);
   workflow::ParseFaults(flags.noise);  // an unknown name fails before the contact map is built
 
@@ -165,8 +199,10 @@ void Run(const Flags& flags, Session& session) {
   if (database) setup_options = workflow::SetupOptionsOf(database->identity());
   setup_options.jobs = jobs;
   setup_options.progress = Interruptible(map_bar, session);
-  const auto setup =
-      std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
+  std::shared_ptr<const workflow::PlanningSetup> setup;
+  session.OncePerHost([&] {
+    setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
+  });
   map_bar.Finish();
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
 
@@ -189,6 +225,16 @@ void Run(const Flags& flags, Session& session) {
   const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
   const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };
 
+  const std::vector<std::int64_t> episodes = workflow::NumbersOfShard(0, flags.episodes, shard);
+  const auto make_worker = [&] {
+    return [runner = make_runner()](std::int64_t episode) mutable {
+      return evaluation::ToJson(runner.Run(static_cast<std::uint64_t>(episode))).dump();
+    };
+  };
+  const nlohmann::json settings = SettingsJson(flags, *setup, database.get());
+  if (session.serves()) return workflow::ServePieces(*session.ranks, settings.dump(), jobs, make_worker);
+  if (session.ranks != nullptr) session.ranks->Assemble(settings.dump());
+
   std::optional<OutputFile> out;
   if (!flags.out.empty()) {
     out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
@@ -201,16 +247,18 @@ void Run(const Flags& flags, Session& session) {
   std::vector<evaluation::EpisodeSummaryRow> rows;
   evaluation::FaultBands bands;
   int solved_online = 0;  // though a database was to answer
-  const auto on_record = [&](const workflow::EpisodeRecord& record) {
-    if (flags.policy == "database" && record.policy != flags.policy) ++solved_online;
+  ProgressBar bar(WithRanks("episodes", session));
+  const auto on_record = [&](std::size_t index, const std::string& line) {
+    const auto record = nlohmann::json::parse(line);
     rows.push_back(evaluation::SummaryRow(record));
     bands.Add(record);
-    if (out) out->Write(evaluation::ToJson(record).dump() + "\n");
+    if (flags.policy == "database" && rows.back().policy != flags.policy) ++solved_online;
+    if (out) out->Write(line + "\n");
+    bar.Update(static_cast<std::int64_t>(index) + 1, static_cast<std::int64_t>(episodes.size()));
   };
-  ProgressBar bar("episodes");
   try {
-    workflow::RunEpisodes(workflow::EpisodeRange(0, flags.episodes), jobs, make_runner, on_record, bar.Callback(),
-                          session.cancellation);
+    workflow::RunPiecesInOrder(episodes, jobs, session.ranks, make_worker, on_record, session.cancellation);
+  } catch (const Interrupted&) {  // by ranks that did not end in time
   } catch (const InputError&) {  // of the output: what is there is cut off
     throw;
   } catch (...) {  // of the world or the machine: what is done is kept
@@ -218,7 +266,11 @@ void Run(const Flags& flags, Session& session) {
     throw;
   }
   bar.Finish();
-  if (out && !rows.empty()) out->Commit();
+  if (out && !rows.empty()) {
+    out->Commit();
+    if (shard && !out->direct()) evaluation::WriteRecordsShard(flags.out, {*shard, flags.episodes, settings});
+  }
+  NoteRanks(session, static_cast<std::int64_t>(rows.size()));
 
   if (!flags.video.empty() && !session.cancellation->cancelled()) {
     workflow::EpisodeOptions film_options = options;
@@ -253,6 +305,7 @@ void Run(const Flags& flags, Session& session) {
     json["perception"] = flags.perception.empty() ? nlohmann::json() : nlohmann::json(flags.perception);
     json["ladder"] = options.ladder;
     json["seed"] = flags.seed;
+    if (session.ranks != nullptr) json["ranks"] = RanksJson(session, static_cast<std::int64_t>(rows.size()));
     PrintJson(json);
   } else {
     Print("task {}, policy {}, noise {}, seed {}: {} episodes\n{}", setup->task().name, flags.policy, flags.noise,
@@ -266,7 +319,7 @@ void Run(const Flags& flags, Session& session) {
     Print("{}", bands.ToText());
   }
   if (session.cancellation->cancelled()) {
-    Note("feeler: interrupted after {} of {} episodes\n", summary.episodes, flags.episodes);
+    Note("feeler: interrupted after {} of {} episodes\n", summary.episodes, episodes.size());
     session.exit_code = 1;
   }
 }
@@ -311,7 +364,8 @@ void AddRunCommand(CLI::App& app, Session& session) {
   AddInteger(*command, "--video-episode", flags->video_episode, 0, std::numeric_limits<std::int64_t>::max(),
              "which episode the video shows");
   command->add_flag("--json", flags->json, "print the summary as JSON");
-  command->callback([flags, &session] { Run(*flags, session); });
+  AddShard(*command, flags->shard, "the episodes, for feeler records merge");
+  command->callback([command, flags, &session] { Run(*command, *flags, session); });
 }
 
 }  // namespace feeler::cli

@@ -22,6 +22,11 @@ void NoteLoss(int error) {
   if (LostReason().empty()) LostReason() = std::generic_category().message(error == 0 ? EIO : error);
 }
 
+bool& Muted() {
+  static bool muted = false;
+  return muted;
+}
+
 bool WriteAll(int descriptor, std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = write(descriptor, text.data(), text.size());
@@ -45,12 +50,16 @@ void OpenClosedStreams() {
   }
 }
 
+void Mute() { Muted() = true; }
+
 void PrintResult(std::string_view text) {
+  if (Muted()) return;
   errno = 0;
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) NoteLoss(errno);
 }
 
 void Tell(std::string_view text) {
+  if (Muted()) return;
   std::fflush(stdout);
   if (std::ferror(stdout) != 0) NoteLoss(errno);
   (void)WriteAll(STDERR_FILENO, text);

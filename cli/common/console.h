@@ -16,6 +16,9 @@ void PrintResult(std::string_view text);
 /// What a person wants to know meanwhile, to standard error. Never throws; what cannot be written is dropped.
 void Tell(std::string_view text);
 
+/// From now on nothing is printed or told: another process of the same job does.
+void Mute();
+
 template <class... Arguments>
 void Print(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
   PrintResult(fmt::format(format, std::forward<Arguments>(arguments)...));

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "feeler/cli/common/console.h"
 #include "feeler/cli/common/signals.h"
@@ -41,7 +42,16 @@ void RequireKnownCommands(CLI::App& app, int argc, char** argv) {
   }
 }
 
+std::function<void(const std::string&, int)>& Listener() {
+  static std::function<void(const std::string&, int)> listener;
+  return listener;
+}
+
 int Fail(std::string_view message, int code) {
+  if (Listener()) {
+    Listener()(std::string(message), code);
+    return 0;
+  }
   Note("feeler: error: {}\n", message);
   return code;
 }
@@ -123,6 +133,12 @@ int Run(CLI::App& app, const Session& session, int argc, char** argv) {
 }
 
 }  // namespace
+
+void TellErrorsTo(std::function<void(const std::string& message, int code)> listener) {
+  Listener() = std::move(listener);
+}
+
+int ExplainException() { return Explain(); }
 
 void BeginProgram(CancellationToken& cancellation) {
   OpenClosedStreams();

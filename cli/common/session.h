@@ -1,10 +1,15 @@
 #pragma once
 
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "feeler/cli/common/progress_bar.h"
 #include "feeler/core/progress.h"
+
+namespace feeler::workflow {
+class Ranks;
+}
 
 namespace feeler::cli {
 
@@ -12,6 +17,12 @@ namespace feeler::cli {
 struct Session {
   CancellationToken* cancellation = nullptr;
   int exit_code = 0;
+  workflow::Ranks* ranks = nullptr;  ///< the processes of this job; null if it is alone (always for feeler-execute)
+
+  /// True on ranks that work for rank 0, which alone holds the files. (cli/session.cpp)
+  bool serves() const;
+  /// Does it once a host before all others there, where there are ranks. (cli/session.cpp)
+  void OncePerHost(const std::function<void()>& load) const;
 };
 
 /// Prints a result for machines: one JSON document on stdout.

@@ -17,6 +17,7 @@ constexpr long kGraceNanoseconds = 1'500'000'000;
 // Reached from signal handlers.
 std::atomic<CancellationToken*> token{nullptr};
 std::atomic<int> signals_seen{0};
+std::atomic<bool> silent{false};
 timer_t grace_timer;
 bool has_timer = false;
 
@@ -24,6 +25,7 @@ bool has_timer = false;
 [[noreturn]] void EndNow() {
   SettleOutputsInSignalHandler();
   constexpr std::string_view kMessage = "feeler: interrupted: what was done is kept\n";
+  if (silent.load()) _exit(1);
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
   _exit(1);
 }
@@ -57,6 +59,8 @@ void Handle(int number, void (*handler)(int)) {
 }
 
 }  // namespace
+
+void EndSilently() { silent = true; }
 
 void CancelOnSignals(CancellationToken& cancellation) {
   token = &cancellation;

@@ -8,5 +8,7 @@ namespace feeler::cli {
 /// that are whole up to here take their places (OutputFile), the exit code is 1. A second signal ends at once. A SIGHUP
 /// that was ignored at the start stays ignored; SIGPIPE is ignored: writing fails instead. Call once.
 void CancelOnSignals(CancellationToken& cancellation);
+/// What a signal ends is ended without a word: another process of the same job tells.
+void EndSilently();
 
 }  // namespace feeler::cli

@@ -67,14 +67,25 @@ EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record) {
           std::move(rungs)};
 }
 
+EpisodeSummaryRow SummaryRow(const nlohmann::json& record) {
+  // On a robot nobody knows what is true: what the executor believes stands for it.
+  const auto judged_or_believed = [&](const char* key) {
+    return record.at(key).is_null() ? record.at("believed").at(key).get<bool>() : record.at(key).get<bool>();
+  };
+  std::vector<std::string> rungs;
+  for (const auto& rung : record.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());
+  return {record.at("task").get<std::string>(),      record.at("policy").get<std::string>(),
+          judged_or_believed("localized"), judged_or_believed("inserted"),
+          record.at("reason").get<std::string>(),    record.at("sim_time_s").get<double>(),
+          record.at("path_length_m").get<double>(),  record.at("policy_moves").get<double>(),
+          record.at("contacts").get<double>(),       record.at("peak_force_n").get<double>(),
+          record.at("timing").at("plan_cpu_s").get<double>(), std::move(rungs)};
+}
+
 std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
   std::ifstream in(path);
   if (!in) throw InputError(path, "cannot be read", "give a records file written by feeler run --out");
   std::vector<EpisodeSummaryRow> rows;
-  // On a robot nobody knows what is true: what the executor believes stands for it.
-  const auto judged_or_believed = [](const nlohmann::json& json, const char* key) {
-    return json.at(key).is_null() ? json.at("believed").at(key).get<bool>() : json.at(key).get<bool>();
-  };
   int number = 0;
   for (std::string line; std::getline(in, line);) {
     ++number;
@@ -82,15 +93,7 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
     try {
       if (IsNestedDeeper(line))
         throw InputError(fmt::format("{} line {}", path, number), "is nested too deep", "run the episode again");
-      const auto json = nlohmann::json::parse(line);
-      std::vector<std::string> rungs;
-      for (const auto& rung : json.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());
-      rows.push_back({json.at("task").get<std::string>(), json.at("policy").get<std::string>(),
-                      judged_or_believed(json, "localized"), judged_or_believed(json, "inserted"),
-                      json.at("reason").get<std::string>(), json.at("sim_time_s").get<double>(),
-                      json.at("path_length_m").get<double>(), json.at("policy_moves").get<double>(),
-                      json.at("contacts").get<double>(), json.at("peak_force_n").get<double>(),
-                      json.at("timing").at("plan_cpu_s").get<double>(), std::move(rungs)});
+      rows.push_back(SummaryRow(nlohmann::json::parse(line)));
     } catch (const nlohmann::json::exception& e) {
       throw InputError(path + " line " + std::to_string(number), std::string("not an episode record: ") + e.what(),
                        "remove the line");

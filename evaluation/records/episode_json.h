@@ -28,6 +28,9 @@ struct EpisodeSummaryRow {
 };
 EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record);
 
+/// Of a record as it stands in a file. Throws nlohmann::json::exception for another object.
+EpisodeSummaryRow SummaryRow(const nlohmann::json& record);
+
 /// Reads a records file. Throws InputError naming file and line for a line that is no record.
 std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path);
 

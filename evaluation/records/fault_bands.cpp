@@ -11,9 +11,12 @@ constexpr int kBands = 4;
 
 }  // namespace
 
-void FaultBands::Add(const workflow::EpisodeRecord& record) {
-  for (const auto& [fault, value] : record.fault_values) {
-    seen_[fault].push_back({value, record.inserted, record.execution.sim_time_s});
+void FaultBands::Add(const nlohmann::json& record) {
+  const auto values = record.find("fault_values");
+  if (values == record.end()) return;
+  for (const auto& [fault, value] : values->items()) {
+    seen_[fault].push_back(
+        {value.get<double>(), record.at("inserted").get<bool>(), record.at("sim_time_s").get<double>()});
   }
 }
 

@@ -5,14 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "feeler/workflow/episode/episode_record.h"
-
 namespace feeler::evaluation {
 
 /// Episodes of faults that are drawn from ranges, counted by how large the fault was.
 class FaultBands {
  public:
-  void Add(const workflow::EpisodeRecord& record);
+  /// A line of a records file.
+  void Add(const nlohmann::json& record);
   bool empty() const { return seen_.empty(); }
   /// For each fault four bands of equal width between the least and the greatest value met: `{fault, from, to,
   /// episodes, inserted, time_max_s}`, bands without an episode left out.

@@ -1,18 +1,20 @@
 #include "feeler/planner/family/preprocess.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "feeler/core/orientation_lattice.h"
 #include "feeler/core/worker_pool.h"
+#include "feeler/planner/family/family_solver.h"
 
 namespace feeler::planner {
 namespace {
@@ -36,34 +38,35 @@ class Framework {
  public:
   Framework(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
             const PreprocessOptions& options, PolicySink& sink)
-      : task_(task),
-        map_(std::move(map)),
+      : solver_(task, std::move(map), family, options),
         family_(family),
         options_(options),
         sink_(sink),
-        traits_{.openings = options.openings, .orientations = LatticeOrientations(task) > 1},
-        solver_(options.solver),
         order_(OrderOf(family, options.order, options.seed)),
         states_(order_.size()) {
-    solver_.on_bounds = nullptr;
-    solver_.cancellation = options.cancellation;
-    Validate(solver_);
-    needs_experience_ = solver_.solver == SolverKind::kERtdpBel && options.experience != ExperienceKind::kNone;
+    if (!solver_.needs_experience() && options.jobs.threads() + static_cast<int>(options.distant.size()) > 1) {
+      std::ranges::stable_sort(order_, std::ranges::greater(),
+                               [&](std::size_t i) { return family.problems[i].Count(); });
+    }
   }
 
   PreprocessSummary Run() {
-    const auto begin = std::chrono::steady_clock::now();
-    summary_.problems = static_cast<std::int64_t>(order_.size());
+    MarkWanted();
+    MarkStored();
+    const std::size_t near = static_cast<std::size_t>(options_.jobs.threads());
     if (!order_.empty()) {
-      tables_ = options_.tables;
-      if (!tables_)
-        tables_ = BuildPlanningTables(MakeCuboidProblem(task_, map_, LargestExtents(family_)),
-                                      WithFamilyBudget(solver_, traits_), options_.jobs);
-      MarkStored();
-      RunOnThreads(options_.jobs.threads(), [this] { Work(); });
+      std::atomic<std::size_t> next{0};
+      RunOnThreads(static_cast<int>(near + options_.distant.size()), [&] {
+        // The calling thread always runs, and works here; of the others those that can be had.
+        const std::size_t worker = next++;
+        if (worker >= near) return Work(options_.distant[worker - near]);
+        Work([this](const Extents& extents, const std::optional<SimilarProblem>& similar) {
+          return solver_.Solve(extents, similar);
+        });
+      });
     }
     summary_.cancelled = Cancelled();
-    summary_.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    summary_.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     return summary_;
   }
 
@@ -71,16 +74,27 @@ class Framework {
   enum class Progress { kOpen, kRunning, kSolved, kFailed };
   struct State {
     Progress progress = Progress::kOpen;
+    bool wanted = true;          ///< to be handed over
+    bool helps = false;          ///< to be solved for its policy, though not wanted
     bool stored_before = false;  ///< by an earlier run; the policy is read when it is needed
     std::shared_ptr<const PolicyGraph> policy;
+    bool to_do() const { return progress == Progress::kOpen && (wanted || helps); }
   };
 
   const Extents& At(std::size_t k) const { return family_.problems[order_[k]]; }
   bool Cancelled() const { return options_.cancellation != nullptr && options_.cancellation->cancelled(); }
 
+  void MarkWanted() {
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      states_[k].wanted =
+          !options_.only || std::binary_search(options_.only->begin(), options_.only->end(), At(k));
+      if (states_[k].wanted) ++summary_.problems;
+    }
+  }
+
   void MarkStored() {
     for (std::size_t k = 0; k < order_.size(); ++k) {
-      if (!sink_.Done(At(k))) continue;
+      if (!states_[k].wanted || !sink_.Done(At(k))) continue;
       states_[k].progress = Progress::kSolved;
       states_[k].stored_before = true;
       ++summary_.skipped;
@@ -112,63 +126,79 @@ class Framework {
     return best;
   }
 
+  /// True if the policy that k is solved with is there, or none is needed. One that nobody is to hand over is put on
+  /// the list.
+  bool IsReady(std::size_t k, std::size_t& similar) {
+    while (true) {
+      similar = solver_.needs_experience() ? MostSimilar(k) : k;
+      if (similar == k) return true;
+      State& state = states_[similar];
+      if (state.progress == Progress::kOpen && !state.to_do()) {
+        state.helps = true;
+        first_open_ = std::min(first_open_, similar);
+      }
+      if (state.progress != Progress::kSolved) return false;
+      if (state.policy) return true;
+      std::optional<PolicyGraph> stored = sink_.Load(At(similar));
+      if (stored) {
+        state.policy = std::make_shared<const PolicyGraph>(std::move(*stored));
+        return true;
+      }
+      state.progress = Progress::kFailed;
+    }
+  }
+
   /// Waits for a problem that can be solved now: the first open one whose experience is ready. Returns false when there
   /// is nothing left to do.
   bool Take(std::unique_lock<std::mutex>& lock, std::size_t& taken, std::size_t& similar) {
     while (true) {
       if (Cancelled() || failed_) return false;
-      while (first_open_ < order_.size() && states_[first_open_].progress != Progress::kOpen) ++first_open_;
+      while (first_open_ < order_.size() && !states_[first_open_].to_do()) ++first_open_;
       if (first_open_ == order_.size()) return false;
-      const std::size_t end = std::min(order_.size(), first_open_ + kLookAhead);
-      for (std::size_t k = first_open_; k < end; ++k) {
-        if (states_[k].progress != Progress::kOpen) continue;
-        similar = needs_experience_ ? MostSimilar(k) : k;
-        if (similar != k && states_[similar].progress != Progress::kSolved) continue;
-        if (similar != k && !states_[similar].policy) {
-          std::optional<PolicyGraph> stored = sink_.Load(At(similar));
-          if (!stored) {
-            states_[similar].progress = Progress::kFailed;
-            --k;
-            continue;
-          }
-          states_[similar].policy = std::make_shared<const PolicyGraph>(std::move(*stored));
-        }
+      const std::size_t begin = first_open_;
+      std::size_t seen = 0;
+      for (std::size_t k = begin; k < order_.size() && seen < kLookAhead; ++k) {
+        if (!states_[k].to_do()) continue;
+        ++seen;
+        if (!IsReady(k, similar)) continue;
         taken = k;
         states_[k].progress = Progress::kRunning;
         return true;
       }
-      changed_.wait(lock);
+      if (first_open_ < begin) continue;  // helpers were put on the list
+      changed_.wait_for(lock, std::chrono::milliseconds(200));  // a cancellation notifies nobody
     }
   }
 
-  void Work() {
+  void Finish(std::size_t k, SolverResult result) {
+    if (states_[k].wanted) {
+      sink_.Store(At(k), solver_.ProblemOf(At(k)), result);
+      ++(result.complete() ? summary_.complete : summary_.failed);
+      Advance();
+    } else {
+      ++summary_.helpers;
+    }
+    summary_.cpu_s += result.cpu_s;
+    states_[k].progress = result.complete() ? Progress::kSolved : Progress::kFailed;
+    if (solver_.needs_experience() && result.complete()) {
+      states_[k].policy = std::make_shared<const PolicyGraph>(std::move(*result.policy));
+    }
+    changed_.notify_all();
+  }
+
+  void Work(const DistantSolver& solve) {
     std::unique_lock lock(mutex_);
     try {
       std::size_t k = 0;
       std::size_t similar = 0;
       while (Take(lock, k, similar)) {
-        const std::shared_ptr<const PolicyGraph> policy = similar != k ? states_[similar].policy : nullptr;
+        std::optional<SimilarProblem> experience;
+        if (similar != k) experience = SimilarProblem{At(similar), states_[similar].policy};
         lock.unlock();
-        const Problem problem = MakeCuboidProblem(task_, map_, At(k));
-        std::optional<Problem> similar_problem;
-        Experience experience;
-        if (policy) {
-          similar_problem = MakeCuboidProblem(task_, map_, At(similar));
-          experience = {options_.experience, &*similar_problem, policy.get()};
-        }
-        SolverResult result =
-            Solve(problem, WithFamilyBudget(solver_, traits_, problem.hypotheses.size()), tables_, experience);
+        SolverResult result = solve(At(k), experience);
         lock.lock();
         if (result.status == SolverStatus::kCancelled) break;
-        sink_.Store(At(k), problem, result);
-        summary_.cpu_s += result.cpu_s;
-        ++(result.complete() ? summary_.complete : summary_.failed);
-        states_[k].progress = result.complete() ? Progress::kSolved : Progress::kFailed;
-        if (needs_experience_ && result.complete()) {
-          states_[k].policy = std::make_shared<const PolicyGraph>(std::move(*result.policy));
-        }
-        Advance();
-        changed_.notify_all();
+        Finish(k, std::move(result));
       }
     } catch (...) {
       if (!lock.owns_lock()) lock.lock();
@@ -179,17 +209,13 @@ class Framework {
     changed_.notify_all();
   }
 
-  const Task& task_;
-  std::shared_ptr<const ContactMap> map_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  // before the tables are built
+  FamilySolver solver_;
   const ProblemFamily& family_;
   const PreprocessOptions& options_;
   PolicySink& sink_;
-  FamilyTraits traits_;
-  SolverOptions solver_;
-  bool needs_experience_ = false;
   std::vector<std::size_t> order_;
   std::vector<State> states_;
-  std::shared_ptr<const PlanningTables> tables_;
 
   std::mutex mutex_;
   std::condition_variable changed_;

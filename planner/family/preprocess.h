@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
@@ -43,6 +45,16 @@ inline constexpr int kSmallOrientedHypotheses = 600;
 SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
                                std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
 
+/// The most similar solved problem, whose policy another is solved with.
+struct SimilarProblem {
+  Extents extents;
+  std::shared_ptr<const PolicyGraph> policy;
+};
+
+/// Solves a problem of the family somewhere else (on another machine), with the policy of a similar one as experience;
+/// called from one thread. Law: the result of FamilySolver::Solve with the same options, or status kCancelled.
+using DistantSolver = std::function<SolverResult(const Extents& extents, const std::optional<SimilarProblem>& similar)>;
+
 struct PreprocessOptions {
   /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them for each problem.
   SolverOptions solver;
@@ -53,23 +65,31 @@ struct PreprocessOptions {
   Parallelism jobs;
   /// Tables made by an earlier call of BuildPlanningTables for this task and these solver options; null to build them.
   std::shared_ptr<const PlanningTables> tables;
+  /// The problems of the family to solve and hand over, in lexicographic order; null: all. Order, tables and choice of
+  /// experience are those of the whole family, so the results are, too: other problems are solved along the way where
+  /// their policies are needed, and not handed over.
+  std::shared_ptr<const std::vector<Extents>> only;
+  /// Further workers beside the `jobs` threads, each with a thread of this process that waits for it.
+  std::vector<DistantSolver> distant;
   const CancellationToken* cancellation = nullptr;  ///< problems in flight are dropped
   ProgressCallback progress;                        ///< problems done, of all
 };
 
 struct PreprocessSummary {
-  std::int64_t problems = 0;
+  std::int64_t problems = 0;  ///< to be handed over
   std::int64_t skipped = 0;   ///< done by an earlier run
   std::int64_t complete = 0;  ///< solved in this run with a complete policy
   std::int64_t failed = 0;    ///< no complete policy within the limits, or unlocalizable
+  std::int64_t helpers = 0;   ///< solved for their policies alone
   bool cancelled = false;
   double wall_s = 0.0;
   double cpu_s = 0.0;  ///< summed over problems
 };
 
 /// Algorithm 3: solves the problems of a family in order, each with the most similar solved problem as experience, and
-/// hands every policy to the sink. Threads work along the real dependencies; the results are the same for any number of
-/// jobs and after a resume (what a time limit stopped is exempt).
+/// hands every policy to the sink. Threads and distant solvers work along the real dependencies; the results are the
+/// same for any number of either and after a resume (what a time limit stopped is exempt). Without experience several
+/// workers begin with the largest problems, so that none is left over at the end.
 PreprocessSummary Preprocess(const Task& task, std::shared_ptr<const ContactMap> map, const ProblemFamily& family,
                              const PreprocessOptions& options, PolicySink& sink);
 

@@ -49,6 +49,7 @@ struct Database::State {
     for (const TableSchema& table : SchemaOf(version)) connection->Execute(table.sql);
     meta = ToMeta(wanted);
     meta[kMetaAxes] = AxesText(wanted.axes);
+    if (wanted.shard) meta[kMetaShard] = ShardText(*wanted.shard);
     meta[kMetaCount] = "0";
     meta[kMetaSum] = fmt::format("{:016x}", 0);
     meta[kMetaChecksum] = MetaChecksum(meta);

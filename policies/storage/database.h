@@ -15,6 +15,16 @@
 
 namespace feeler::policies {
 
+/// One of `count` files that hold a family together.
+struct DatabaseShard {
+  int index = 1;              ///< from 1
+  int count = 1;
+  std::int64_t problems = 0;  ///< of the family that fall to this file
+  std::int64_t family = 0;    ///< problems of the family
+  std::string digest;         ///< of the list of the family's problems
+  bool operator==(const DatabaseShard&) const = default;
+};
+
 /// What a database was made for and how. A database continues only under the same identity (`created_by` excepted):
 /// policies of two geometries or two settings never mix.
 struct DatabaseIdentity {
@@ -28,6 +38,8 @@ struct DatabaseIdentity {
   /// The uncertain axes of the task, in its order (files of version 1: x, y, z). For reading and printing extents; what
   /// the database is made for is said by the fingerprint.
   std::vector<AxisKind> axes = {AxisKind::kX, AxisKind::kY, AxisKind::kZ};
+  /// What part of a family the file is to hold; no part of the content digest.
+  std::optional<DatabaseShard> shard = std::nullopt;
 };
 
 /// One problem of the family and what became of it.

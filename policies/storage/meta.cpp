@@ -43,7 +43,20 @@ CostWeights CostFrom(const json& cost) {
   return CostPerAxis(per_cell.get<std::array<double, 3>>(), cost.at("per_contact"), cost.at("per_action"));
 }
 
+std::string ShardName(const std::optional<DatabaseShard>& shard) {
+  return shard ? fmt::format("shard {} of {}", shard->index, shard->count) : "a whole family";
+}
+
 }  // namespace
+
+std::string ShardText(const DatabaseShard& shard) {
+  return json{{"index", shard.index},
+              {"count", shard.count},
+              {"problems", shard.problems},
+              {"family", shard.family},
+              {"digest", shard.digest}}
+      .dump();
+}
 
 std::string MetaChecksum(const Meta& meta) {
   ByteWriter out;
@@ -96,6 +109,11 @@ DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
                               CostFrom(cost),  meta.at("settings"),    meta.at("created_by")};
     const auto axes = meta.find(kMetaAxes);
     if (axes != meta.end()) identity.axes = ParseAxes(axes->second, path);
+    const auto shard = meta.find(kMetaShard);
+    if (shard != meta.end()) {
+      const json part = json::parse(shard->second);
+      identity.shard = {part.at("index"), part.at("count"), part.at("problems"), part.at("family"), part.at("digest")};
+    }
     return identity;
   } catch (const std::exception&) {  // a key is missing or is not JSON
     throw Damaged(path, "table meta lacks an entry");
@@ -116,6 +134,14 @@ void RequireSameIdentity(const Meta& stored, const DatabaseIdentity& identity, c
     throw InputError(path, fmt::format("was made with another {} ({}, not {})", key, have, want),
                      "use the same settings to continue it, or write to another file");
   }
+  const std::optional<DatabaseShard> shard = FromMeta(stored, path).shard;
+  if (shard == identity.shard) return;
+  if (ShardName(shard) != ShardName(identity.shard)) {
+    throw InputError(path, fmt::format("holds {}, not {}", ShardName(shard), ShardName(identity.shard)),
+                     "give the same --shard to continue it, or write to another file");
+  }
+  throw InputError(path, fmt::format("holds {} of another family", ShardName(shard)),
+                   "give the same --family to continue it, or write to another file");
 }
 
 }  // namespace feeler::policies

@@ -13,6 +13,7 @@ namespace feeler::policies {
 using Meta = std::map<std::string, std::string>;
 inline constexpr const char* kMetaChecksum = "checksum";
 inline constexpr const char* kMetaAxes = "axes";         // since version 2
+inline constexpr const char* kMetaShard = "shard";       // of a part of a family: JSON
 inline constexpr const char* kMetaCount = "problems";    // rows of the table problems
 inline constexpr const char* kMetaSum = "problems_sum";  // of their checksums, modulo 2^64: a lost row shows
 
@@ -23,6 +24,7 @@ Meta ReadMeta(const SqliteConnection& connection, const std::string& path);
 void WriteMeta(const SqliteConnection& connection, const Meta& meta);
 
 std::string AxesText(const std::vector<AxisKind>& axes);
+std::string ShardText(const DatabaseShard& shard);
 /// Throws std::invalid_argument for settings that are not a JSON object.
 Meta ToMeta(const DatabaseIdentity& identity);
 /// Throws InputError if an entry is missing or unreadable.

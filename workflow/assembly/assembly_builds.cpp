@@ -2,8 +2,13 @@
 
 #include <algorithm>
 #include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
 
 #include "feeler/core/worker_pool.h"
+#include "feeler/workflow/scale/ordered_pieces.h"
+#include "feeler/workflow/scale/shard.h"
 
 namespace feeler::workflow {
 
@@ -28,6 +33,73 @@ void BuildAssemblies(const Assembly& assembly, const AssemblyPlan& plan, const A
         };
       },
       [&](std::size_t, const AssemblyRecord& record) { on_record(record); }, options.cancellation);
+}
+
+namespace {
+
+/// Makes workers that build the structure of a number and give its lines, a line each.
+auto BuildWorkers(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
+                  const AssemblyOptions& options) {
+  return [&] {
+    return [&](std::int64_t build) {
+      AssemblyOptions own = options;
+      own.seed = options.seed + static_cast<std::uint64_t>(build);
+      own.film = nullptr;
+      std::string text;
+      for (const auto& line : ToJsonLines(assembly, BuildAssembly(assembly, plan, tasks, own))) {
+        text += line.dump() + "\n";
+      }
+      return text;
+    };
+  };
+}
+
+}  // namespace
+
+void BuildAssembliesOnRanks(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
+                            const AssemblyOptions& options, int builds, Parallelism jobs, Ranks& ranks,
+                            const std::function<void(const std::vector<std::string>& lines)>& on_lines) {
+  RunPiecesInOrder(
+      NumbersOfShard(0, builds, std::nullopt), jobs, &ranks, BuildWorkers(assembly, plan, tasks, options),
+      [&](std::size_t, const std::string& text) {
+        std::vector<std::string> lines;
+        std::istringstream in(text);
+        for (std::string line; std::getline(in, line);) lines.push_back(line);
+        on_lines(lines);
+      },
+      options.cancellation);
+}
+
+void ServeAssemblies(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
+                     const AssemblyOptions& options, Parallelism jobs, Ranks& ranks, const std::string& identity) {
+  ServePieces(ranks, identity, jobs, BuildWorkers(assembly, plan, tasks, options));
+}
+
+AssemblyRecord SummaryRecord(const std::vector<std::string>& lines) {
+  AssemblyRecord record;
+  for (const std::string& line : lines) {
+    const auto json = nlohmann::json::parse(line);
+    record.assembly = json.at("assembly");
+    record.seed = json.at("seed");
+    if (!json.contains("step")) {
+      record.complete = json.at("complete");
+      record.reason = json.at("reason");
+      record.insertions = json.at("insertions");
+      record.sim_time_s = json.at("sim_time_s");
+      continue;
+    }
+    AssemblyStepRecord& step = record.steps.emplace_back();
+    step.insertion = json.at("step");
+    step.inserted = json.at("inserted");
+    step.drawn_error.lateral_m = json.at("off_drawing").at("lateral_m");
+    step.drawn_error.angle_rad = json.at("off_drawing").at("angle_rad");
+    for (const auto& tried : json.at("attempts")) {
+      InsertionAttempt& attempt = step.attempts.emplace_back();
+      attempt.policy_source = tried.at("policy");
+      attempt.execution.ladder.resize(tried.at("ladder").size());
+    }
+  }
+  return record;
 }
 
 AssemblySummary Summarize(const std::vector<AssemblyRecord>& records) {

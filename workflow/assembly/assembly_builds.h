@@ -7,6 +7,7 @@
 
 #include "feeler/core/parallelism.h"
 #include "feeler/workflow/assembly/assembly_build.h"
+#include "feeler/workflow/scale/ranks.h"
 
 namespace feeler::workflow {
 
@@ -16,6 +17,18 @@ namespace feeler::workflow {
 void BuildAssemblies(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
                      const AssemblyOptions& options, int builds, Parallelism jobs,
                      const std::function<void(const AssemblyRecord&)>& on_record, const ProgressCallback& progress);
+
+/// The same over the ranks of a job, on rank 0; on_lines receives the record as the lines that ToJsonLines gives.
+/// Throws Interrupted where other ranks did not end in time after a cancellation.
+void BuildAssembliesOnRanks(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
+                            const AssemblyOptions& options, int builds, Parallelism jobs, Ranks& ranks,
+                            const std::function<void(const std::vector<std::string>& lines)>& on_lines);
+/// On another rank: builds what rank 0 asks for. Both sides give the same `identity`.
+void ServeAssemblies(const Assembly& assembly, const AssemblyPlan& plan, const AssemblyTasks& tasks,
+                     const AssemblyOptions& options, Parallelism jobs, Ranks& ranks, const std::string& identity);
+
+/// What Summarize reads of a record, from its lines. Throws nlohmann::json::exception for others.
+AssemblyRecord SummaryRecord(const std::vector<std::string>& lines);
 
 /// Counts over builds.
 struct AssemblySummary {

@@ -7,19 +7,19 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/interrupted.h"
 #include "feeler/core/json_depth.h"
 #include "feeler/core/random.h"
-#include "feeler/core/worker_pool.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/perception/input_file.h"
 #include "feeler/version.h"
+#include "feeler/workflow/scale/ordered_pieces.h"
 
 namespace feeler::workflow {
 namespace {
@@ -53,34 +53,81 @@ void Place(const CalibrationOptions& options, CalibrationSample& sample) {
                         (sample.held_out ? options.installations : 0);
 }
 
+/// Throws whatever for a line that is none.
+CalibrationSample SampleFrom(const std::string& line, const std::string& path, const CalibrationOptions& options) {
+  if (IsNestedDeeper(line)) throw InputError(path, "is nested too deep", "take the poses again");
+  const auto json = nlohmann::json::parse(line);
+  CalibrationSample sample;
+  sample.index = json.at("index").get<std::int64_t>();
+  sample.found = json.at("found").get<bool>();
+  sample.distance_m = json.at("distance_m").get<double>();
+  sample.fitness = json.at("fitness").get<double>();
+  sample.cpu_s = json.at("cpu_s").get<double>();
+  sample.rejected = json.at("rejected").get<int>();
+  sample.poses.world_T_true = perception::PoseAt(json, "true", path);
+  sample.poses.world_T_estimate = perception::PoseAt(json, "estimate", path);
+  Place(options, sample);
+  sample.poses.installation = sample.installation;
+  return sample;
+}
+
+using Samples = std::vector<std::optional<CalibrationSample>>;
+
 /// The samples that an interrupted run left; none if it had other settings. A last line that is cut off is dropped.
-std::vector<std::optional<CalibrationSample>> ReadPartial(const std::string& path, const std::string& settings,
-                                                          const CalibrationOptions& options) {
-  std::vector<std::optional<CalibrationSample>> samples(2 * static_cast<std::size_t>(options.poses));
+Samples ReadPartial(const std::string& path, const std::string& settings, const CalibrationOptions& options) {
+  Samples samples(2 * static_cast<std::size_t>(options.poses));
   std::ifstream in(path);
   std::string line;
   if (!in || !std::getline(in, line) || line != settings) return samples;
   while (std::getline(in, line)) {
     try {
-      if (IsNestedDeeper(line)) continue;
-      const auto json = nlohmann::json::parse(line);
-      CalibrationSample sample;
-      sample.index = json.at("index").get<std::int64_t>();
-      sample.found = json.at("found").get<bool>();
-      sample.distance_m = json.at("distance_m").get<double>();
-      sample.fitness = json.at("fitness").get<double>();
-      sample.cpu_s = json.at("cpu_s").get<double>();
-      sample.rejected = json.at("rejected").get<int>();
-      sample.poses.world_T_true = perception::PoseAt(json, "true", path);
-      sample.poses.world_T_estimate = perception::PoseAt(json, "estimate", path);
-      Place(options, sample);
-      sample.poses.installation = sample.installation;
+      const CalibrationSample sample = SampleFrom(line, path, options);
       samples.at(static_cast<std::size_t>(sample.index)) = sample;
     } catch (const std::exception&) {
       continue;
     }
   }
   return samples;
+}
+
+/// The file of a shard is continued, never replaced.
+void RequireOwnShard(const std::string& path, const std::string& settings) {
+  std::ifstream in(path);
+  std::string line;
+  if (!in || !std::getline(in, line) || line == settings) return;
+  throw InputError(path, "exists and is no shard of a calibration with these settings: it is not overwritten",
+                   "choose another name");
+}
+
+/// Adds what the shards hold.
+void AddShards(const std::string& settings, const CalibrationOptions& options, Samples& samples) {
+  std::vector<std::string> holders(samples.size());
+  for (const std::string& path : options.from) {
+    std::ifstream in(path);
+    std::string line;
+    if (!in) throw InputError(path, "cannot be read", "give what feeler perceive calibrate --shard left");
+    if (!std::getline(in, line) || line != settings) {
+      throw InputError(path, "is no shard of a calibration with these settings",
+                       "give the task, --poses, --installations, --frames and --seed that it was made with");
+    }
+    for (std::size_t number = 2; std::getline(in, line); ++number) {
+      const std::string where = fmt::format("{} line {}", path, number);
+      try {
+        const CalibrationSample sample = SampleFrom(line, path, options);
+        const auto index = static_cast<std::size_t>(sample.index);
+        if (!holders.at(index).empty()) {
+          throw InputError(where, fmt::format("holds pose {}, as {} does", index, holders[index]),
+                           "give each shard once");
+        }
+        holders[index] = path;
+        samples[index] = sample;
+      } catch (const InputError&) {
+        throw;
+      } catch (const std::exception&) {
+        throw InputError(where, "is damaged", "run the shard again, it goes on");
+      }
+    }
+  }
 }
 
 CalibrationSample Take(CameraCell& cell, std::int64_t index, const CalibrationOptions& options) {
@@ -100,6 +147,16 @@ CalibrationSample Take(CameraCell& cell, std::int64_t index, const CalibrationOp
   sample.rejected = placement.rejected;
   sample.poses = {sight.registration.world_T_target, placement.world_T_target, sample.installation};
   return sample;
+}
+
+/// Makes workers that take the pose of a number; a thread each, as a camera is.
+auto SampleWorkers(const std::shared_ptr<const env::Scene>& scene, const std::shared_ptr<const TargetFinder>& finder,
+                   const CalibrationOptions& options) {
+  return [&scene, &finder, &options] {
+    return [&options, cell = std::make_unique<CameraCell>(scene, finder, options.noise)](std::int64_t index) {
+      return ToJson(Take(*cell, index, options)).dump();
+    };
+  };
 }
 
 std::vector<perception::PoseSample> Found(const std::vector<CalibrationSample>& samples, bool held_out) {
@@ -164,10 +221,12 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   calibration.table.averaged_frames = options.perception.averaged_frames;
 
   const std::string settings = SettingsJson(calibration.table.fingerprint, options).dump();
-  std::vector<std::optional<CalibrationSample>> samples(2 * static_cast<std::size_t>(options.poses));
+  Samples samples(2 * static_cast<std::size_t>(options.poses));
+  if (options.shard) RequireOwnShard(options.partial, settings);
+  if (!options.partial.empty()) samples = ReadPartial(options.partial, settings, options);
+  AddShards(settings, options, samples);
   std::ofstream partial;
   if (!options.partial.empty()) {
-    samples = ReadPartial(options.partial, settings, options);
     std::string kept = settings + "\n";
     for (const auto& sample : samples) {
       if (sample) kept += ToJson(*sample).dump() + "\n";
@@ -177,39 +236,34 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
     if (!partial) throw InputError(options.partial, "cannot be written", "choose another folder");
   }
 
-  std::vector<std::size_t> missing;
-  for (std::size_t index = 0; index < samples.size(); ++index) {
-    if (!samples[index]) missing.push_back(index);
+  std::vector<std::int64_t> missing;
+  const auto total = static_cast<std::int64_t>(samples.size());
+  const std::vector<std::int64_t> own = NumbersOfShard(0, total, options.shard);
+  for (const std::int64_t index : own) {
+    if (!samples[static_cast<std::size_t>(index)]) missing.push_back(index);
   }
-  const auto had = static_cast<std::int64_t>(samples.size() - missing.size());
-  std::mutex mutex;  // guards camera_m, which all see at the same place
-  Eigen::Vector3d camera_m = Eigen::Vector3d::Zero();
-  const auto make_worker = [&] {
-    auto cell = std::make_unique<CameraCell>(scene, finder, options.noise);
-    {
-      const std::lock_guard lock(mutex);
-      camera_m = cell->eye_m();
-    }
-    return [&, cell = std::move(cell)](std::size_t i) {
-      return Take(*cell, static_cast<std::int64_t>(missing[i]), options);
-    };
-  };
-  const auto keep = [&](std::size_t i, const CalibrationSample& sample) {
-    samples[missing[i]] = sample;
-    if (partial.is_open() && !(partial << ToJson(sample).dump() << "\n" << std::flush)) {
+  const auto had = static_cast<std::int64_t>(own.size() - missing.size());
+  const auto keep = [&](std::size_t i, const std::string& line) {
+    samples[static_cast<std::size_t>(missing[i])] = SampleFrom(line, "pose", options);
+    if (partial.is_open() && !(partial << line << "\n" << std::flush)) {
       throw InputError(options.partial, "cannot be written", "free some space");
     }
     const auto done = had + static_cast<std::int64_t>(i) + 1;
-    if (options.progress) options.progress(done, static_cast<std::int64_t>(samples.size()));
+    if (options.progress) options.progress(done, static_cast<std::int64_t>(own.size()));
   };
-  RunInOrder(missing.size(), options.jobs, make_worker, keep, options.cancellation);
+  if (options.ranks != nullptr) options.ranks->Assemble(settings);
+  try {
+    RunPiecesInOrder(missing, options.jobs, options.ranks, SampleWorkers(scene, finder, options), keep,
+                     options.cancellation);
+  } catch (const Interrupted&) {  // NOLINT(bugprone-empty-catch): by ranks that did not end in time
+  }
+  calibration.table.camera_m = CameraCell(scene, finder, options.noise).eye_m();
 
   for (const auto& sample : samples) {
     if (sample) calibration.samples.push_back(*sample);
   }
-  calibration.table.camera_m = camera_m;
   for (const CalibrationSample& sample : calibration.samples) calibration.not_found += sample.found ? 0 : 1;
-  calibration.complete = calibration.samples.size() == samples.size();
+  calibration.complete = calibration.samples.size() == samples.size() && !options.shard;
   if (!calibration.complete) return calibration;
 
   const std::vector<perception::PoseSample> made_from = Found(calibration.samples, false);
@@ -224,6 +278,15 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
     std::filesystem::remove(options.partial, ignored);
   }
   return calibration;
+}
+
+void ServeCalibration(const env::TaskModel& task_model, const CalibrationOptions& options) {
+  options.Validate();
+  const auto scene = std::make_shared<const env::Scene>(env::BuildScene(task_model));
+  const auto finder = std::make_shared<const TargetFinder>(task_model, options.perception);
+  const std::string fingerprint = env::Fingerprint(task_model, env::Opening::kClosed);
+  ServePieces(*options.ranks, SettingsJson(fingerprint, options).dump(), options.jobs,
+              SampleWorkers(scene, finder, options));
 }
 
 ErrorSummary SummarizeErrors(const Calibration& calibration, bool correct) {

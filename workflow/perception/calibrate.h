@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "feeler/env/vision/depth_noise.h"
 #include "feeler/perception/uncertainty_table.h"
 #include "feeler/workflow/perception/perceive.h"
+#include "feeler/workflow/scale/ranks.h"
+#include "feeler/workflow/scale/shard.h"
 
 namespace feeler::workflow {
 
@@ -23,6 +26,9 @@ struct CalibrationOptions {
   Parallelism jobs;
   std::string
       partial;  ///< file that keeps finished poses; a run that finds one of the same settings goes on; empty: none
+  std::optional<Shard> shard;     ///< take only the poses of it: the calibration is then never complete
+  std::vector<std::string> from;  ///< partial files of shards, of the same settings, to go on from
+  Ranks* ranks = nullptr;         ///< take poses too (ServeCalibration); may be null
   ProgressCallback progress;
   const CancellationToken* cancellation = nullptr;
   void Validate() const;  ///< throws InputError
@@ -53,7 +59,12 @@ struct Calibration {
 /// makes the uncertainty table from what estimates and truth differ by. One half of poses and installations makes the
 /// table, the other judges it. Sample k is drawn from (seed, k): the same at any number of threads. A target that is
 /// not found makes no rule; it counts in `not_found`.
+/// A shard leaves its poses in `partial`. Throws InputError for a file of `from` that is of other settings, or holds a
+/// pose that another holds too, or none.
 Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions& options);
+
+/// On a rank that works for another: takes the poses that it asks for.
+void ServeCalibration(const env::TaskModel& task_model, const CalibrationOptions& options);
 
 /// Errors of estimates, one of each kind per sample that was found, held-out ones only.
 struct ErrorSummary {

@@ -84,8 +84,11 @@ void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
 }
 
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
-                            const planner::PreprocessOptions& options, const std::string& path) {
-  policies::Database database = policies::Database::OpenOrCreate(path, IdentityOf(setup, options));
+                            const planner::PreprocessOptions& options, const std::string& path,
+                            const std::optional<policies::DatabaseShard>& shard) {
+  policies::DatabaseIdentity identity = IdentityOf(setup, options);
+  identity.shard = shard;
+  policies::Database database = policies::Database::OpenOrCreate(path, identity);
   planner::PreprocessOptions of_setup = options;
   of_setup.openings = setup.opening == env::Opening::kOpen;
   policies::DatabaseSink sink(database, options.solver);

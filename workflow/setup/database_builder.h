@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "feeler/planner/family/preprocess.h"
@@ -21,9 +22,11 @@ struct DatabaseBuild {
 
 /// Builds or continues the database at `path` (the main job, steps 1 and 2): solves every problem of the family that
 /// the file does not hold yet, one transaction each; leaves the bundle of the task beside it (bundle.h). Throws
-/// InputError for a file of another task or other settings, or one that cannot be written.
+/// InputError for a file of another task or other settings, or one that cannot be written. `shard`: what part of the
+/// family the file says it holds, that of options.only.
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
-                            const planner::PreprocessOptions& options, const std::string& path);
+                            const planner::PreprocessOptions& options, const std::string& path,
+                            const std::optional<policies::DatabaseShard>& shard = std::nullopt);
 
 struct DatabaseVerification {
   std::int64_t problems = 0;

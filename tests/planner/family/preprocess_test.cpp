@@ -1,14 +1,16 @@
 // Laws of preprocessing: every problem of the family ends in the sink, once; policies are the same for one and several
-// threads, and when a run is cut into two; an experience never breaks the bound; a cancelled run stores only finished
+// threads, on distant solvers, in parts of the family, and when a run is cut into two; an experience never breaks the bound; a cancelled run stores only finished
 // problems; a limit that was set is kept, and only the certified solver is given one that was not.
 
 #include "feeler/planner/family/preprocess.h"
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <map>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/family/family_solver.h"
 #include "feeler/planner/policy/evaluate.h"
 #include "tests/planner/synthetic_plug.h"
 
@@ -94,6 +96,61 @@ TEST_P(Preprocessing, SameForAnyThreadsAndAfterResume) {
   const PreprocessSummary rest = Preprocess(task, map, family, options, resumed);
   EXPECT_EQ(rest.skipped + rest.complete, 12);
   ExpectSame(serial, resumed);
+}
+
+
+TEST_P(Preprocessing, PartsAreThoseOfTheWhole) {
+  const Task task = testing::MakePlugTask();
+  const auto map = testing::MakePlugMap(false, {8, 7, 6});
+  const ProblemFamily family = ParseProblemFamily("2..3x2..4x2..3");
+  PreprocessOptions options;
+  options.solver.solver = std::get<0>(GetParam());
+  options.solver.epsilon = 2.0;
+  options.order = std::get<1>(GetParam());
+  options.jobs = Parallelism(2);
+  MemorySink whole;
+  Preprocess(task, map, family, options, whole);
+
+  MemorySink parts;
+  std::int64_t helpers = 0;
+  for (std::size_t part = 0; part < 3; ++part) {
+    std::vector<Extents> only;
+    for (std::size_t i = part; i < family.problems.size(); i += 3) only.push_back(family.problems[i]);
+    MemorySink own;
+    options.only = std::make_shared<const std::vector<Extents>>(only);
+    const PreprocessSummary summary = Preprocess(task, map, family, options, own);
+    EXPECT_EQ(summary.problems, 4);
+    EXPECT_EQ(summary.complete, 4);
+    helpers += summary.helpers;
+    for (const auto& [extents, result] : own.results) EXPECT_TRUE(parts.results.emplace(extents, result).second);
+  }
+  ExpectSame(whole, parts);
+  EXPECT_EQ(helpers > 0, options.solver.solver == SolverKind::kERtdpBel);
+}
+
+TEST_P(Preprocessing, DistantSolversChangeNothing) {
+  const Task task = testing::MakePlugTask();
+  const auto map = testing::MakePlugMap(false, {8, 7, 6});
+  const ProblemFamily family = ParseProblemFamily("2..3x2..4x2..3");
+  PreprocessOptions options;
+  options.solver.solver = std::get<0>(GetParam());
+  options.solver.epsilon = 2.0;
+  options.order = std::get<1>(GetParam());
+  MemorySink alone;
+  Preprocess(task, map, family, options, alone);
+
+  const FamilySolver elsewhere(task, map, family, options);
+  std::atomic<int> calls{0};
+  for (int i = 0; i < 3; ++i) {
+    options.distant.emplace_back([&](const Extents& extents, const std::optional<SimilarProblem>& similar) {
+      ++calls;
+      return elsewhere.Solve(extents, similar);
+    });
+  }
+  MemorySink together;
+  EXPECT_EQ(Preprocess(task, map, family, options, together).complete, 12);
+  ExpectSame(alone, together);
+  EXPECT_GT(calls, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Preprocessing,

@@ -1,0 +1,56 @@
+#include "feeler/cli/session.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "feeler/cli/common/console.h"
+
+namespace feeler::cli {
+
+bool Session::serves() const { return ranks != nullptr && ranks->rank() > 0; }
+
+void Session::OncePerHost(const std::function<void()>& load) const {
+  if (ranks == nullptr) return load();
+  ranks->OncePerHost(load);
+}
+
+CLI::Option* AddShard(CLI::App& command, std::string& text, const std::string& of) {
+  return command.add_option("--shard", text,
+                            "I/N: part I of N, from 1, of " + of +
+                                "; auto: as the environment of a Slurm array, OpenMPI, PBS or Kubernetes says (docs/scale.md)");
+}
+
+std::optional<workflow::Shard> ShardOf(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  return workflow::ParseShard(text);
+}
+
+Parallelism JobsOf(const CLI::App& command, int jobs, const Session& session) {
+  return Parallelism(session.ranks != nullptr && command.count("--jobs") == 0 ? 1 : jobs);
+}
+
+nlohmann::json RanksJson(const Session& session, std::int64_t total) {
+  nlohmann::json json = nlohmann::json::array();
+  if (session.ranks == nullptr) return json;
+  std::vector<workflow::RankAccount> accounts = session.ranks->Accounts();
+  for (const workflow::RankAccount& account : accounts) total -= account.done;
+  accounts.front().done = std::max<std::int64_t>(0, total);
+  for (const workflow::RankAccount& account : accounts) {
+    json.push_back({{"rank", account.rank}, {"host", account.host}, {"done", account.done}, {"cpu_s", account.cpu_s}});
+  }
+  return json;
+}
+
+void NoteRanks(const Session& session, std::int64_t total) {
+  for (const auto& rank : RanksJson(session, total)) {
+    Note("rank {} on {}: {} done, {:.1f} s CPU\n", rank["rank"].get<int>(), rank["host"].get<std::string>(),
+         rank["done"].get<std::int64_t>(), rank["cpu_s"].get<double>());
+  }
+}
+
+std::string WithRanks(const std::string& label, const Session& session) {
+  if (session.ranks == nullptr) return label;
+  return label + " (" + std::to_string(session.ranks->size()) + " ranks)";
+}
+
+}  // namespace feeler::cli
