@@ -73,14 +73,12 @@ def _turns(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.vstack([v * scale[:, None], np.zeros((1, 3))])
 
 
-def _left(record: dict[str, Any], times_s: NDArray[np.float64], begun_s: float) -> NDArray[np.int64]:
-    """Hypotheses that were left at each time, from the decisions of the record."""
-    first = int(np.prod([int(n) for n in record["extents"]]))
-    left = np.full(len(times_s), first, dtype=np.int64)
-    ends = begun_s + np.cumsum([0.0, *(move.get("duration_s", 0.0) for move in record["moves"])])
-    for decision in record.get("decisions", []):
-        if decision.get("attempt", 0) == 0:
-            left[times_s >= ends[min(decision["motions"], len(ends) - 1)]] = len(decision["left"])
+def _left(track: dict[str, Any], begun_s: float) -> NDArray[np.int64]:
+    """Hypotheses that were left at each time."""
+    times_s = track["times_s"]
+    left = np.full(len(times_s), int(np.prod(track["record"]["extents"])), dtype=np.int64)
+    for since_s, count in track["decisions"]:
+        left[times_s >= begun_s + since_s] = count
     return left
 
 
@@ -135,7 +133,7 @@ def record(
         parts["times_s"].append(times_s)
         parts["contact"].append(contact)
         parts["motions"].append(track["motions"])
-        parts["left"].append(_left(track["record"], times_s, float(times_s[0])))
+        parts["left"].append(_left(track, float(times_s[0])))
         starts.append(starts[-1] + len(seen))
         records.append(Result(track["record"]))
     if not records:

@@ -1,4 +1,5 @@
 // Episodes at control rate: what learners are given.
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -114,6 +115,17 @@ nb::list RecordTracks(PlanningTask& task, const nb::object& policy, const std::s
           d["times_s"] = NewArray(std::move(track.times_s), {n});
           d["motions"] = NewArray(std::move(track.motions), {n});
           d["record"] = ToPython(json);
+          // Of the policy's own walk: how many hypotheses explain all answers so far, and since when.
+          std::vector<double> ends_s = {0.0};
+          for (const execution::MoveRecord& move : record.execution.moves)
+            ends_s.push_back(ends_s.back() + move.duration_s);
+          nb::list decisions;
+          for (const execution::DecisionRecord& decision : record.execution.decisions) {
+            if (decision.attempt != 0) continue;
+            const auto motions = std::min(static_cast<std::size_t>(std::max(decision.motions, 0)), ends_s.size() - 1);
+            decisions.append(nb::make_tuple(ends_s[motions], decision.left.size()));
+          }
+          d["decisions"] = decisions;
           result.append(d);
         }
         report(i + 1, episodes);

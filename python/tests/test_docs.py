@@ -26,8 +26,8 @@ def test_code_of_the_planner_page(tmp_path, monkeypatch):
 
 def test_the_reference_is_that_of_the_docstrings():
     written = (ROOT / "docs/python-reference.md").read_text(encoding="utf-8")
-    made = runpy.run_path(str(ROOT / "python/reference.py"))["reference"]()
-    assert written == made, "run python/reference.py > docs/python-reference.md"
+    made = runpy.run_path(str(ROOT / "python/tools/reference.py"))["reference"]()
+    assert written == made, "run python/tools/reference.py > docs/python-reference.md"
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)

@@ -1,4 +1,4 @@
-"""Writes the reference of the package from its docstrings: ``python python/reference.py > docs/python-reference.md``."""
+"""Writes the reference of the package from its docstrings: ``python python/tools/reference.py > docs/python-reference.md``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _doc(value: object) -> str:
 
 def reference() -> str:
     """The page as text."""
-    parts = ["# Reference of the Python package\nMade from the docstrings by `python/reference.py`; do not edit.\n"]
+    parts = ["# Reference of the Python package\nMade from the docstrings by `python/tools/reference.py`; do not edit.\n"]
     for name in feeler.__all__:
         value = getattr(feeler, name)
         if not callable(value):
