@@ -64,6 +64,11 @@ function(feeler_target name)
   target_link_libraries(feeler_${name} PUBLIC ${links} PRIVATE $<BUILD_INTERFACE:feeler_options>)
   set_target_properties(feeler_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
                         SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  if(FEELER_PIC AND NOT arg_NO_INSTALL)
+    # Nobody replaces our functions at run time: the compiler may inline them as in a program.
+    set_target_properties(feeler_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(feeler_${name} PRIVATE -fno-semantic-interposition)
+  endif()
   if(NOT arg_NO_UNITY)
     feeler_unity(feeler_${name} ${arg_SOURCES})
   endif()

@@ -24,7 +24,9 @@ struct VectorEnv::Slot {
   int index;
   InsertionEnv env;
   std::uint64_t episodes = 0;
-  bool over = false;  ///< the episode; next-step mode then resets at the next action
+  std::uint64_t seed = 0;
+  std::uint64_t first = 0, stride = 1;  ///< which episodes of the seed
+  bool over = false;                    ///< the episode; next-step mode then resets at the next action
   Action action;
   Info info, final_info;
   std::exception_ptr error;
@@ -167,10 +169,10 @@ VectorEnv::~VectorEnv() {
 
 void VectorEnv::Begin(Slot& slot, StepResult& result) {
   ResetOptions episode = options_.episode;
-  episode.episode = static_cast<std::uint64_t>(slot.index) + slot.episodes * slots_.size();
+  episode.episode = slot.first + slot.episodes * slot.stride;
   ++slot.episodes;
   slot.over = false;
-  result = slot.env.Reset(seed_, episode);
+  result = slot.env.Reset(slot.seed, episode);
 }
 
 void VectorEnv::Publish(Slot& slot, const StepResult& result) {
@@ -210,10 +212,7 @@ void VectorEnv::Run(Slot& slot) {
   }
 }
 
-void VectorEnv::Reset(std::uint64_t seed) {
-  pool_->Wait(slots_.size());
-  pool_->Collect(slots_);
-  seed_ = seed;
+void VectorEnv::BeginAll() {
   reset_ = true;
   for (const auto& slot : slots_) {
     slot->episodes = 0;
@@ -223,12 +222,55 @@ void VectorEnv::Reset(std::uint64_t seed) {
   }
 }
 
+void VectorEnv::Reset(std::uint64_t seed) {
+  pool_->Wait(slots_.size());
+  pool_->Collect(slots_);
+  for (const auto& slot : slots_) {
+    slot->seed = seed;
+    slot->first = static_cast<std::uint64_t>(slot->index);
+    slot->stride = slots_.size();
+  }
+  BeginAll();
+}
+
+void VectorEnv::Reset(std::span<const std::uint64_t> seeds) {
+  if (seeds.size() != slots_.size()) {
+    throw InputError("vector environment", fmt::format("{} seeds for {} environments", seeds.size(), slots_.size()),
+                     "give one each");
+  }
+  pool_->Wait(slots_.size());
+  pool_->Collect(slots_);
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    slots_[i]->seed = seeds[i];
+    slots_[i]->first = 0;
+    slots_[i]->stride = 1;
+  }
+  BeginAll();
+}
+
 void VectorEnv::ResetOne(int environment) {
   Slot& slot = Idle(environment);
   if (!reset_) throw InputError("vector environment", "no seed", "call Reset first");
   StepResult result;
   Begin(slot, result);
   Publish(slot, result);
+}
+
+void VectorEnv::ResetOne(int environment, std::uint64_t seed) {
+  Slot& slot = Idle(environment);
+  slot.seed = seed;
+  slot.first = 0;
+  slot.stride = 1;
+  slot.episodes = 0;
+  reset_ = true;
+  StepResult result;
+  Begin(slot, result);
+  Publish(slot, result);
+}
+
+void VectorEnv::SetEpisodeOptions(const ResetOptions& episode) {
+  pool_->Wait(slots_.size());
+  options_.episode = episode;
 }
 
 VectorEnv::Slot& VectorEnv::Idle(int environment) {

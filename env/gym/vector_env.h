@@ -52,8 +52,16 @@ class VectorEnv {
 
   /// Begins with the first episode of each environment. Waits for all that was sent.
   void Reset(std::uint64_t seed);
+  /// The same with a seed for each environment: environment i plays the episodes 0, 1, 2, ... of seeds[i], as an
+  /// InsertionEnv of its own would. Throws InputError when there are not as many seeds as environments.
+  void Reset(std::span<const std::uint64_t> seeds);
   /// Begins the next episode of one idle environment.
   void ResetOne(int environment);
+  /// Begins the first episode of a seed of its own in one idle environment; its next are 1, 2, ... of that seed.
+  void ResetOne(int environment, std::uint64_t seed);
+
+  /// Of every reset from now on; the episode number in it is ignored. Waits for all that was sent.
+  void SetEpisodeOptions(const ResetOptions& episode);
 
   /// One action per environment, in order. Throws InputError when an environment is busy or an action is refused; then
   /// none was carried out.
@@ -88,13 +96,13 @@ class VectorEnv {
   class Pool;
   struct Slot;
   void Begin(Slot& slot, StepResult& result);
+  void BeginAll();
   void Run(Slot& slot);
   void Publish(Slot& slot, const StepResult& result);
   Slot& Idle(int environment);
   void RequireWelcome(const Slot& slot, const Action& action) const;
 
   VectorEnvOptions options_;
-  std::uint64_t seed_ = 0;
   bool reset_ = false;
   std::vector<std::unique_ptr<Slot>> slots_;
   std::vector<double> observations_, final_observations_, rewards_;

@@ -208,8 +208,11 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   std::optional<Watched> watched;
   if (options_.replay) watched.emplace(robot, recorder);
 
+  const std::unique_ptr<Robot> wrapped = options_.wrap_robot ? options_.wrap_robot(robot) : nullptr;
+  Robot& driven = wrapped ? *wrapped : robot;
+
   const double transfer_start_s = ThreadCpuSeconds();
-  const MotionResult transfer = robot.Transfer(execution::LatticeStartPose(task, problem, draw.world_T_estimate));
+  const MotionResult transfer = driven.Transfer(execution::LatticeStartPose(task, problem, draw.world_T_estimate));
   record.timing.transfer_cpu_s = ThreadCpuSeconds() - transfer_start_s;
 
   recorder.MarkStart(robot.Time());
@@ -222,7 +225,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
       options.travel_model = env::MakeExactTravel(setup_->model, env::Opening::kOpen);
     }
     if (options_.confirm_limit_m) options.confirm_limit_m = *options_.confirm_limit_m;
-    record.execution = execution::Execute(task, problem, draw.world_T_estimate, *policy, robot, options);
+    record.execution = execution::Execute(task, problem, draw.world_T_estimate, *policy, driven, options);
   } else {
     record.execution.reason = execution::TransferFailure(transfer);
   }

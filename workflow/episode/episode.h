@@ -37,6 +37,9 @@ struct EpisodeOptions {
   std::optional<double> force_budget_n;
   /// Keep what the episode looked like in its record. Not for a robot that somebody else observes.
   bool replay = false;
+  /// Stands between the executor and the simulated robot: a driver that is to be tried, or a robot of another language.
+  /// Empty: the executor drives the simulated robot itself. Called at the start of each episode.
+  std::function<std::unique_ptr<Robot>(env::SimulatedRobot&)> wrap_robot;
   /// Nobody but the scoring sees the true pose: the environment leaves it out of its info, too.
   bool withhold_true_pose = false;
   double force_offset_n = 0.0;  ///< of the force sensor along z, beside the noise
