@@ -15,7 +15,6 @@
 namespace feeler::evaluation {
 namespace {
 
-using nlohmann::json;
 
 struct File {
   std::string path;
@@ -30,7 +29,7 @@ void ReadLines(const File& file, std::map<std::int64_t, std::string>& lines) {
   std::size_t present = 0;
   for (std::string line; std::getline(in, line);) {
     const std::string where = fmt::format("{} line {}", file.path, present + 1);
-    const json record = IsNestedDeeper(line) ? json() : json::parse(line, nullptr, false);
+    const nlohmann::json record = IsNestedDeeper(line) ? nlohmann::json() : nlohmann::json::parse(line, nullptr, false);
     if (in.eof() || !record.is_object() || !record.contains("episode") || !record["episode"].is_number_integer()) {
       throw InputError(where, "is no episode record", "run the shard again");
     }
@@ -52,7 +51,7 @@ void ReadLines(const File& file, std::map<std::int64_t, std::string>& lines) {
 }
 
 /// The first setting in which two runs differ.
-std::string Difference(const json& have, const json& want) {
+std::string Difference(const nlohmann::json& have, const nlohmann::json& want) {
   for (const auto& [key, value] : want.items()) {
     if (!have.contains(key) || have[key] != value) {
       return fmt::format("{} ({}, not {})", key, have.contains(key) ? have[key].dump() : "none", value.dump());
@@ -99,7 +98,7 @@ void RequireAllShards(const std::vector<File>& files) {
 std::string ShardFileOf(const std::string& records) { return records + ".shard.json"; }
 
 void WriteRecordsShard(const std::string& records, const RecordsShard& shard) {
-  const json text = {{"shard", {{"index", shard.shard.index}, {"count", shard.shard.count}}},
+  const nlohmann::json text = {{"shard", {{"index", shard.shard.index}, {"count", shard.shard.count}}},
                      {"episodes", shard.episodes},
                      {"settings", shard.settings}};
   WriteFileAtomically(ShardFileOf(records), text.dump(2) + "\n");
@@ -112,7 +111,7 @@ RecordsShard ReadRecordsShard(const std::string& records) {
   try {
     const std::string text{std::istreambuf_iterator<char>(in), {}};
     if (IsNestedDeeper(text)) throw InputError(path, "is nested too deep", "run the shard again");
-    const json said = json::parse(text);
+    const nlohmann::json said = nlohmann::json::parse(text);
     RecordsShard shard;
     shard.shard = {said.at("shard").at("index").get<int>(), said.at("shard").at("count").get<int>()};
     shard.episodes = said.at("episodes").get<std::int64_t>();
@@ -120,7 +119,7 @@ RecordsShard ReadRecordsShard(const std::string& records) {
     const bool sane = shard.shard.count >= 1 && shard.shard.count <= workflow::kMostShards && shard.shard.index >= 1 &&
                       shard.shard.index <= shard.shard.count && shard.episodes >= 0 && shard.settings.is_object();
     if (sane) return shard;
-  } catch (const json::exception&) {  // NOLINT(bugprone-empty-catch): as below
+  } catch (const nlohmann::json::exception&) {  // NOLINT(bugprone-empty-catch): as below
   }
   throw InputError(path, "is damaged", "run the shard again");
 }
@@ -145,8 +144,8 @@ std::vector<EpisodeSummaryRow> MergeRecords(const std::vector<std::string>& path
   OutputFile output(out);
   for (const auto& [episode, line] : lines) {
     try {
-      rows.push_back(SummaryRow(json::parse(line)));
-    } catch (const json::exception& e) {
+      rows.push_back(SummaryRow(nlohmann::json::parse(line)));
+    } catch (const nlohmann::json::exception& e) {
       throw InputError(fmt::format("episode {}", episode), std::string("is no record: ") + e.what(),
                        "run its shard again");
     }
