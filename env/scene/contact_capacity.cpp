@@ -13,7 +13,7 @@ namespace feeler::env {
 namespace {
 
 constexpr int kRowsPerContact = 4;
-constexpr int kRowsOfRobot = 40;  // friction and limits of joints, and what touches the bench
+constexpr int kRowsOfRobot = 24;  // friction and limits of joints, and what touches the bench
 constexpr int kMostRows = 4000;
 constexpr double kOverlap_m = 0.0005;  // how far a touch presses in
 constexpr double kNear_m = 0.001;      // boxes around turned pieces, and pieces that stand on a slant
@@ -47,7 +47,7 @@ int ContactsAt(const Eigen::Vector3d& tool_at, const std::vector<Bounds>& tool, 
     box.min() -= Eigen::Vector3d::Constant(kNear_m);
     box.max() += Eigen::Vector3d::Constant(kNear_m);
     for (const Bounds& theirs : target) {
-      if (box.intersects(theirs.box)) contacts += mine.is_box && theirs.is_box ? 8 : 1;
+      if (box.intersects(theirs.box)) contacts += mine.is_box && theirs.is_box ? 4 : 1;
     }
   }
   return contacts;

@@ -11,7 +11,7 @@ struct ContactCapacity {
 };
 
 /// What a tool can meet at once, from the bounding boxes of its pieces and the target's: on each side of each piece of
-/// the target, and inside the opening at some depths; pairs of boxes meet in up to eight points, others in one.
+/// the target, and inside the opening at some depths; faces of boxes meet in four points, other pairs in one.
 /// Between the defaults of SceneOptions, which serve parts of a few boxes, and what memory allows (mjData grows with
 /// the square of the rows: 130 MB at 4000).
 ContactCapacity CapacityFor(const TaskModel& task_model);

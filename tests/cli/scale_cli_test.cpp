@@ -1,5 +1,6 @@
 // Laws of jobs in parts, through the command line:
-//   - shards merged are the whole: the same content digest, the same records but for measured times, also where policies
+//   - shards merged are the whole: the same content digest, the same records but for measured times, also where
+//   policies
 //     are made with the experience of others, and through the scripts of examples/scale/;
 //   - a shard that is there twice, missing, unfinished, overlapping or foreign is refused in one line, and nothing is
 //     left behind or overwritten;
@@ -33,7 +34,8 @@ std::string Digest(const std::string& file) {
 }
 
 void Preprocess(const std::string& file, std::vector<std::string> more = {}) {
-  std::vector<std::string> arguments = {"preprocess", "--task", "plug", "--family", kFamily, "--jobs", "1", "--out", file};
+  std::vector<std::string> arguments = {"preprocess", "--task", "plug",  "--family", kFamily,
+                                        "--jobs",     "1",      "--out", file};
   arguments.insert(arguments.end(), more.begin(), more.end());
   const CommandResult result = RunFeeler(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -135,14 +137,17 @@ TEST(Shards, AreRefusedForWhatIsWrongWithThem) {
   EXPECT_EQ(ReadFile(parts.whole), there);
   // A shard is continued as that shard only.
   EXPECT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", kFamily, "--out", s1}).exit_code, 2);
-  EXPECT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", kFamily, "--out", s1, "--shard", "2/3"}).exit_code, 2);
-  EXPECT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", kFamily, "--out", out, "--shard", "4/3"}).exit_code, 2);
+  EXPECT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", kFamily, "--out", s1, "--shard", "2/3"}).exit_code,
+            2);
+  EXPECT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", kFamily, "--out", out, "--shard", "4/3"}).exit_code,
+            2);
 }
 
 TEST(Shards, DisjointFamiliesMergeAndOverlappingOnesDoNot) {
   const std::string folder = ScratchFolder("disjoint");
   const auto make = [&](const char* family, const std::string& file) {
-    const CommandResult result = RunFeeler({"preprocess", "--task", "plug", "--family", family, "--jobs", "1", "--out", file});
+    const CommandResult result =
+        RunFeeler({"preprocess", "--task", "plug", "--family", family, "--jobs", "1", "--out", file});
     EXPECT_EQ(result.exit_code, 0) << result.err;
   };
   make("2..3x2x2", folder + "/a.db");
@@ -165,17 +170,18 @@ std::vector<Json> Records(const std::string& file) {
   return records;
 }
 
-CommandResult Run(const std::string& out, std::vector<std::string> more = {}) {
-  std::vector<std::string> arguments = {"run", "--task", "plug", "--db", Family().whole, "--episodes", "7", "--out", out};
+CommandResult RunEpisodesOf(const std::string& out, std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments = {"run",        "--task", "plug",  "--db", Family().whole,
+                                        "--episodes", "7",      "--out", out};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return RunFeeler(arguments);
 }
 
 TEST(Shards, OfRecordsMergedAreTheWhole) {
   const std::string folder = ScratchFolder("records");
-  ASSERT_EQ(Run(folder + "/whole.jsonl").exit_code, 0);
+  ASSERT_EQ(RunEpisodesOf(folder + "/whole.jsonl").exit_code, 0);
   for (const char* index : {"1", "2", "3"}) {
-    ASSERT_EQ(Run(folder + "/" + index + ".jsonl", {"--shard", std::string(index) + "/3"}).exit_code, 0);
+    ASSERT_EQ(RunEpisodesOf(folder + "/" + index + ".jsonl", {"--shard", std::string(index) + "/3"}).exit_code, 0);
   }
   const std::string out = folder + "/merged.jsonl";
   const std::string one = folder + "/1.jsonl", two = folder + "/2.jsonl", three = folder + "/3.jsonl";
@@ -188,7 +194,7 @@ TEST(Shards, OfRecordsMergedAreTheWhole) {
   ExpectRefused(Merge({one, two}, no, "records"), "3 of 3 missing", no);
   ExpectRefused(Merge({one, two, three, one}, no, "records"), "is given twice", no);
   ExpectRefused(Merge({one, two, folder + "/whole.jsonl"}, no, "records"), "is no shard", no);
-  ASSERT_EQ(Run(folder + "/foreign.jsonl", {"--shard", "3/3", "--seed", "2"}).exit_code, 0);
+  ASSERT_EQ(RunEpisodesOf(folder + "/foreign.jsonl", {"--shard", "3/3", "--seed", "2"}).exit_code, 0);
   ExpectRefused(Merge({one, two, folder + "/foreign.jsonl"}, no, "records"), "another seed (2, not 1)", no);
   const std::string lines = ReadFile(two);
   WriteFile(two, lines.substr(0, lines.find('\n') + 1));
@@ -199,8 +205,8 @@ TEST(Shards, OfRecordsMergedAreTheWhole) {
 /// A command of the shell with the binary as $FEELER; out and err in one.
 CommandResult Shell(const std::string& command) {
   const std::string folder = ScratchFolder("shell");
-  const std::string line = "export FEELER='" FEELER_BINARY "'; cd '" + folder + "'; " + command + " > '" + folder +
-                           "/log' 2>&1 < /dev/null";
+  const std::string line =
+      "export FEELER='" FEELER_BINARY "'; cd '" + folder + "'; " + command + " > '" + folder + "/log' 2>&1 < /dev/null";
   const int status = std::system(line.c_str());  // NOLINT(cert-env33-c): a shell is what is tested
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
@@ -216,8 +222,9 @@ TEST(SchedulerExamples, MakeTheWhole) {
   const std::string settings = "FAMILY='" + std::string(kFamily) + "' OUT='" + folder + "/";
   // What Slurm sets for --array=10-14:2.
   for (const char* id : {"10", "12", "14"}) {
-    const CommandResult task = Shell("SLURM_ARRAY_TASK_MIN=10 SLURM_ARRAY_TASK_STEP=2 SLURM_ARRAY_TASK_COUNT=3 SLURM_ARRAY_TASK_ID=" +
-                                     std::string(id) + " " + settings + "slurm' bash " + examples + "slurm-array.sbatch");
+    const CommandResult task =
+        Shell("SLURM_ARRAY_TASK_MIN=10 SLURM_ARRAY_TASK_STEP=2 SLURM_ARRAY_TASK_COUNT=3 SLURM_ARRAY_TASK_ID=" +
+              std::string(id) + " " + settings + "slurm' bash " + examples + "slurm-array.sbatch");
     ASSERT_EQ(task.exit_code, 0) << task.out;
   }
   const std::string slurm = folder + "/slurm/shard-";
@@ -238,7 +245,8 @@ class RanksTest : public ::testing::Test {
     }
   }
   static CommandResult Mpirun(int ranks, const std::string& arguments) {
-    return Shell("mpirun --allow-run-as-root --oversubscribe -n " + std::to_string(ranks) + " \"$FEELER\" " + arguments);
+    return Shell("mpirun --allow-run-as-root --oversubscribe -n " + std::to_string(ranks) + " \"$FEELER\" " +
+                 arguments);
   }
 };
 
@@ -259,9 +267,9 @@ TEST_F(RanksTest, MakeTheSameDatabaseAtAnyNumber) {
 
 TEST_F(RanksTest, MakeTheSameRecords) {
   const std::string folder = ScratchFolder("rank_records");
-  ASSERT_EQ(Run(folder + "/whole.jsonl").exit_code, 0);
-  const CommandResult result = Mpirun(
-      3, "run --task plug --db " + Family().whole + " --episodes 7 --out " + folder + "/ranks.jsonl");
+  ASSERT_EQ(RunEpisodesOf(folder + "/whole.jsonl").exit_code, 0);
+  const CommandResult result =
+      Mpirun(3, "run --task plug --db " + Family().whole + " --episodes 7 --out " + folder + "/ranks.jsonl");
   ASSERT_EQ(result.exit_code, 0) << result.out;
   EXPECT_EQ(Records(folder + "/ranks.jsonl"), Records(folder + "/whole.jsonl"));
 }
@@ -271,9 +279,8 @@ TEST_F(RanksTest, ALostRankLeavesAFileThatGoesOn) {
   const std::string file = ScratchFolder("lost") + "/lost.db";
   const std::string arguments = "preprocess --task plug --family " + std::string(kFamily) + " --out " + file;
   // Rank 1 is a shell that becomes feeler and is killed soon after.
-  const CommandResult lost =
-      Shell("mpirun --allow-run-as-root --oversubscribe -n 1 \"$FEELER\" " + arguments +
-            " : -n 1 sh -c '\"$FEELER\" " + arguments + " & sleep 0.4; kill -9 $!; wait $!'");
+  const CommandResult lost = Shell("mpirun --allow-run-as-root --oversubscribe -n 1 \"$FEELER\" " + arguments +
+                                   " : -n 1 sh -c '\"$FEELER\" " + arguments + " & sleep 0.4; kill -9 $!; wait $!'");
   if (lost.exit_code == 0) {  // it was done before
     EXPECT_EQ(Digest(file), Digest(parts.whole));
     return;
@@ -284,8 +291,10 @@ TEST_F(RanksTest, ALostRankLeavesAFileThatGoesOn) {
 
 TEST_F(RanksTest, ThatDifferAreRefusedOnce) {
   const std::string folder = ScratchFolder("differ");
-  const std::string common = "\"$FEELER\" preprocess --task plug --family " + std::string(kFamily) + " --out " + folder + "/x.db";
-  const CommandResult differ = Shell("mpirun --allow-run-as-root --oversubscribe -n 1 " + common + " : -n 1 " + common + " --gap 1.5");
+  const std::string common =
+      "\"$FEELER\" preprocess --task plug --family " + std::string(kFamily) + " --out " + folder + "/x.db";
+  const CommandResult differ =
+      Shell("mpirun --allow-run-as-root --oversubscribe -n 1 " + common + " : -n 1 " + common + " --gap 1.5");
   EXPECT_EQ(differ.exit_code, 2) << differ.out;
   EXPECT_NE(differ.out.find("feeler: error: rank 1 on "), std::string::npos) << differ.out;
   EXPECT_NE(differ.out.find("has another settings"), std::string::npos) << differ.out;

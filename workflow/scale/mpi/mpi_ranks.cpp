@@ -90,7 +90,7 @@ Greeting GreetingFrom(const std::string& bytes) {
 
 [[noreturn]] void ThrowFailure(int rank, const Greeting& greeting) {
   const std::string where = fmt::format("rank {} on {}", rank, greeting.host);
-  if (greeting.exit_code == 2) throw InputError(where, greeting.failure);
+  if (greeting.exit_code == 2) throw InputError(where, greeting.failure, "all ranks read the same files");
   throw NegativeResult(where, greeting.failure);
 }
 

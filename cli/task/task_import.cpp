@@ -1,5 +1,5 @@
 // feeler task import: from CAD files to a task folder with its evidence.
-#include "feeler/cli/task_import.h"
+#include "feeler/cli/task/task_import.h"
 
 #include <fmt/format.h>
 

@@ -16,7 +16,7 @@
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
-#include "feeler/cli/task_import.h"
+#include "feeler/cli/task/task_import.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/core/parallelism.h"
