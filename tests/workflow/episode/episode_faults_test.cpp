@@ -136,7 +136,7 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
   for (std::uint64_t k = 0; k < 200; ++k) {
     const WorldDraw draw = DrawWorld(task, faults, 0.3, 5, k);
     EXPECT_EQ(draw.values, DrawWorld(task, faults, 0.3, 5, k).values);
-    EXPECT_EQ(draw.robot.force_delay_s, 1e-3 * draw.values.at("latency"));
+    EXPECT_DOUBLE_EQ(draw.robot.force_delay_s, 1e-3 * draw.values.at("latency"));
     EXPECT_EQ(draw.robot.force_noise_n, draw.values.at("force-noise"));
     EXPECT_NEAR(0.3 * draw.physics.contact_friction, draw.values.at("contact-friction"), 1e-12);
     EXPECT_NEAR(1e3 * draw.physics.tool_slip_m.norm(), draw.values.at("slip"), 1e-12);
