@@ -9,6 +9,8 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/model/collision_filter.h"
+#include "feeler/env/model/contact_settings.h"
+#include "feeler/env/mjcf/plain_locale.h"
 
 namespace feeler::env {
 namespace {
@@ -55,8 +57,10 @@ ModelHandle CompileMjcf(const std::string& xml, const std::string& where) {
   std::memcpy(vfs->files.filedata[mj_findFileVFS(&vfs->files, kName)], xml.data(), xml.size());
   std::array<char, 1000> message{};
   const std::lock_guard lock(parser);
+  const PlainLocale plain;
   ModelHandle model(mj_loadXML(kName, &vfs->files, message.data(), static_cast<int>(message.size())));
   if (!model) throw InputError(where, std::string("MuJoCo: ") + message.data(), "correct the MJCF");
+  RequireSaneContactParameters(*model, where);
   return model;
 }
 

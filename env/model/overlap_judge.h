@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -32,7 +33,22 @@ class OverlapJudge {
   /// Of any pair.
   bool Overlap(const Eigen::Vector3d& displacement_m);
 
+  /// Where two geoms overlap.
+  struct Meeting {
+    int tool_geom = -1;
+    int target_geom = -1;
+    Eigen::Vector3d point_m = Eigen::Vector3d::Zero();  ///< in the estimated target frame
+    double depth_m = 0.0;
+  };
+  /// The deepest overlap, if there is one.
+  std::optional<Meeting> Meet(const Eigen::Vector3d& displacement_m);
+
  private:
+  /// Near enough to be asked.
+  bool Near(int tool_geom, int target_geom, const Eigen::Vector3d& displacement_m) const;
+  /// Contacts of one pair; how many.
+  int Collide(int tool_geom, int target_geom, const Eigen::Vector3d& displacement_m, mjContact* contacts);
+
   std::shared_ptr<mjModel> model_;
   DataHandle data_;
   std::vector<int> tool_geoms_;

@@ -9,8 +9,13 @@
 #include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 #include "feeler/core/orientation_lattice.h"
+#include "feeler/env/model/contact_settings.h"
+#include "feeler/env/model/geometry_findings.h"
+#include "feeler/env/model/mesh_check.h"
 #include "feeler/env/model/mujoco_handles.h"
 #include "feeler/env/model/overlap_judge.h"
+#include "feeler/env/mjcf/plain_locale.h"
+#include "feeler/env/model/read_task.h"
 #include "feeler/env/model/task_fields.h"
 #include "feeler/env/model/task_inputs.h"
 #include "feeler/env/model/task_xml.h"
@@ -76,56 +81,6 @@ Pose BodyAtRest(const mjModel& model, int body) {
   return BodyPose(*data, body);
 }
 
-/// Contradictions between the numbers and the geometry.
-void CheckGeometry(const TaskModel& task_model, const std::string& where) {
-  const Task& task = task_model.task;
-  const auto numeric = [&](const char* field) {
-    return fmt::format("{}: <custom><numeric name=\"{}\">", where, field);
-  };
-
-  OverlapJudge open(task_model, task_model.target_geoms);
-  const Eigen::Vector3d inward = UnitVector(task.insertion);
-  // A little short of the end, so that a tool that rests on the floor of the opening is not taken for a collision.
-  constexpr int kSteps = 50;
-  for (int i = 0; i < kSteps; ++i) {
-    const double depth_m = task.insertion_depth_m * i / kSteps;
-    if (open.Overlap(inward * depth_m)) {
-      throw InputError(
-          numeric("feeler_insertion_depth"),
-          fmt::format("the tool, aligned, meets the target {:.4f} m beyond the mouth, before it is inserted", depth_m),
-          "check the origins of the bodies tool and target, the opening, or the depth");
-    }
-  }
-
-  const double just_inside_m = std::min(5e-5, task.insertion_depth_m / 10);
-  const int axis = AxisOf(task.insertion);
-  for (int k = 0; k < 9; ++k) {
-    Eigen::Vector3d lateral_m = Eigen::Vector3d::Zero();
-    lateral_m[(axis + 1) % 3] = task.tolerance.lateral_m * (k % 3 - 1);
-    lateral_m[(axis + 2) % 3] = task.tolerance.lateral_m * (k / 3 - 1);
-    if (open.Overlap(lateral_m + inward * just_inside_m)) {
-      throw InputError(
-          numeric("feeler_tolerance_lateral"),
-          fmt::format("a tool displaced by {} m along each axis misses the opening", task.tolerance.lateral_m),
-          "the tolerance is at most the clearance and the lead-in chamfer");
-    }
-  }
-
-  const Cell cuboid = LargestPositionExtents(task);
-  const Eigen::Vector3d half_m = (cuboid - Cell::Ones()).cast<double>() * (task.cell_m / 2);
-  for (const Eigen::Quaterniond& orientation : TargetOrientations(task)) {
-    OverlapJudge closed(task_model, GeomsOf(task_model, Opening::kClosed), orientation);
-    for (int corner = 0; corner < 27; ++corner) {
-      const Eigen::Vector3d sign(corner % 3 - 1, corner / 3 % 3 - 1, corner / 9 - 1);
-      if (closed.Overlap(task.start_offset_m - sign.cwiseProduct(half_m))) {
-        throw InputError(numeric("feeler_start_offset"),
-                         "the tool starts in collision with the target under a hypothesis of the largest extents",
-                         "start further away or lower feeler_max_cells");
-      }
-    }
-  }
-}
-
 /// Whether the tool, aligned and anywhere on its way in, is free of contact at every turn about the insertion axis.
 bool TurnsFreely(const TaskModel& task_model) {
   const Task& task = task_model.task;
@@ -170,9 +125,11 @@ std::vector<Eigen::Quaterniond> TargetOrientations(const Task& task) {
 
 fs::path ModelsFolder() { return FindData("models"); }
 
-TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+TaskModel ReadTaskFromText(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+  const PlainLocale plain;
   TaskModel task_model;
   task_model.xml = ResolveMjcf(mjcf, name, folder);
+  RequireSoundMeshes(task_model.xml, name);
   task_model.model = std::shared_ptr<const mjModel>(CompileMjcf(task_model.xml, name));
   const mjModel& model = *task_model.model;
   task_model.tool_body = FindBody(model, "tool", name);
@@ -181,7 +138,14 @@ TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, con
   task_model.task = ReadTaskFields(model, name);
   task_model.task.world_T_target = BodyAtRest(model, task_model.target_body);
   task_model.task.name = NameOf(model, fs::path(name).stem().string());
-  CheckGeometry(task_model, name);
+  return task_model;
+}
+
+TaskModel LoadTaskFromText(const std::string& mjcf, const std::string& name, const fs::path& folder) {
+  TaskModel task_model = ReadTaskFromText(mjcf, name, folder);
+  RequireNoError(ContactSettingFindings(task_model, name));
+  RequireNoError(MeshFindings(task_model.xml, name));
+  RequireNoError(GeometryFindings(task_model, name));
   task_model.task.turns_freely = TurnsFreely(task_model);
   return task_model;
 }
@@ -205,7 +169,11 @@ std::vector<std::string> FilesOfTask(const std::string& task) {
   return files;
 }
 
-TaskModel LoadTask(const std::string& task) {
+namespace {
+
+using FromText = TaskModel (*)(const std::string& mjcf, const std::string& name, const fs::path& folder);
+
+TaskModel FromFile(const std::string& task, FromText from_text) {
   const bool is_path = IsPath(task);
   const fs::path file = FileOfTask(task);
   std::error_code error;
@@ -219,12 +187,18 @@ TaskModel LoadTask(const std::string& task) {
                          ? "give a task's name or the path of a task file"
                          : "tasks are:" + (known.empty() ? " none in " + (ModelsFolder() / "tasks").string() : known));
   }
-  TaskModel task_model = LoadTaskFromText(ReadTextFile(file), file.lexically_normal().string(), file.parent_path());
+  TaskModel task_model = from_text(ReadTextFile(file), file.lexically_normal().string(), file.parent_path());
   task_model.file = fs::absolute(file, error).lexically_normal();
   if (error) throw InputError(task, "cannot be located: " + error.message(), "change to another folder");
   task_model.task.file = task_model.file.string();
   return task_model;
 }
+
+}  // namespace
+
+TaskModel LoadTask(const std::string& task) { return FromFile(task, LoadTaskFromText); }
+
+TaskModel ReadTask(const std::string& task) { return FromFile(task, ReadTaskFromText); }
 
 std::vector<std::string> ListTasks() {
   std::vector<std::string> names;

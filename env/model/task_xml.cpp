@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "feeler/core/error.h"
+#include "feeler/env/mjcf/mjcf_numbers.h"
 #include "feeler/env/model/task_inputs.h"
 
 namespace feeler::env {
@@ -134,6 +135,7 @@ std::set<std::string> Resolve(const std::string& mjcf, const std::string& name, 
   if (error) throw InputError(name, "its folder is not to be found: " + error.message(), "change to another folder");
   Includer includer(absolute, document);
   includer.Resolve(root, name);
+  RequireFiniteNumbers(root, name);
   MakeAssetFilesAbsolute(root, absolute);
   return includer.included();
 }
