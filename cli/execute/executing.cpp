@@ -207,6 +207,11 @@ std::unique_ptr<policies::Policy> Executing::PolicyFor(const planner::Extents& e
 
 ExecutorOptions Executing::OptionsFor(const EpisodeReply& told, bool angles) const {
   ExecutorOptions options = execution::OptionsForThreshold(told.contact_threshold_n);
+  // What the operator asks for; what a simulation states; what the task says, above what the sensor needs.
+  options.force_budget_n = flags_.force_budget_n > 0.0 ? flags_.force_budget_n
+                           : told.force_budget_n > 0.0
+                               ? told.force_budget_n
+                               : std::max(bundle_.task.force_budget_n, 1.2 * told.contact_threshold_n);
   options.ladder = !flags_.no_ladder;
   options.online_planner = online_planner_;
   if (angles) options.travel_model = policies::TravelModelOf(bundle_);
@@ -233,7 +238,7 @@ execution::SafetyLimits Executing::LimitsFor(const ExecutorOptions& options) con
   limits.robot = welcome().capabilities;
   limits.speed_scale = flags_.speed;
   limits.most_compliant_n = options.insertion_force_limit_n;
-  if (flags_.force_budget_n > 0.0) limits.force_budget_n = flags_.force_budget_n;
+  limits.force_budget_n = options.force_budget_n;
   return limits;
 }
 
@@ -321,6 +326,7 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   } else {
     episode.execution.reason = execution::TransferFailure(transfer);
   }
+  episode.execution.force_budget_n = options.force_budget_n;
   episode.link_lost = !robot_->lost().empty();
   Judge(*told, episode);
   line.plan_cpu_s = lookup_cpu_s + episode.execution.policy_cpu_s;

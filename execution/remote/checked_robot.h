@@ -55,6 +55,7 @@ class CheckedRobot final : public Robot {
   double Time() const override { return robot_.Time(); }
   void ZeroWrench() override { robot_.ZeroWrench(); }
   CameraView Look() override { return robot_.Look(); }
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override { return robot_.Contact(direction); }
   MotionResult Transfer(const Pose& world_T_tool) override;
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult Guarded(const GuardedMotion& motion) override;

@@ -99,6 +99,7 @@ void Link::Close() {
     SleepSeconds(outbox_.front().at_s - MonotonicSeconds());
     Flush();
   }
+  if (writable_) connection_.Finish();
   Cut();
 }
 

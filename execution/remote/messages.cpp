@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "feeler/core/error.h"
 #include "feeler/execution/remote/messages_json.h"
 #include "feeler/execution/remote/messages_numbers.h"
 
@@ -45,12 +46,26 @@ std::string EncodeReply(WireForm form, std::uint64_t seq, const Reply& reply) {
   return form == WireForm::kJson ? ReplyToJson(seq, reply) : ReplyToNumbers(seq, reply);
 }
 
+namespace {
+
+/// A parser of JSON takes a NUL for the end of the text.
+std::string_view WithoutControl(std::string_view line) {
+  for (const char c : line) {
+    if (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r') {
+      throw InputError("robot message", "holds a control character", "send lines of text");
+    }
+  }
+  return line;
+}
+
+}  // namespace
+
 Framed<Request> DecodeRequest(WireForm form, std::string_view line) {
-  return form == WireForm::kJson ? RequestFromJson(line) : RequestFromNumbers(line);
+  return form == WireForm::kJson ? RequestFromJson(WithoutControl(line)) : RequestFromNumbers(line);
 }
 
 Framed<Reply> DecodeReply(WireForm form, std::string_view line) {
-  return form == WireForm::kJson ? ReplyFromJson(line) : ReplyFromNumbers(line);
+  return form == WireForm::kJson ? ReplyFromJson(WithoutControl(line)) : ReplyFromNumbers(line);
 }
 
 }  // namespace feeler::execution

@@ -110,7 +110,7 @@ struct ResultReply {
   MotionResult result;
   RobotState state;
 };
-struct ContactReply {               ///< what a contact along a direction would be like, as the robot stands
+struct ContactReply {              ///< what a contact along a direction would be like, as the robot stands
   double held_mass_kg = 25.0;      ///< what an obstacle has to stop where the tool cannot turn
   double free_mass_kg = 25.0;      ///< where it can
   double stiffness_n_m = 6e4;      ///< of the parts in contact, force per indentation

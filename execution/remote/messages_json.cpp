@@ -73,7 +73,8 @@ struct RequestBody {
             {"force_limit_n", m.force_limit_n},
             {"time_limit_s", m.time_limit_s},
             {"stiffness_n_m", Vector(m.stiffness_n_m)},
-            {"rotational_stiffness_nm_rad", m.rotational_stiffness_nm_rad}};
+            {"rotational_stiffness_nm_rad", m.rotational_stiffness_nm_rad},
+            {"rest_time_s", m.rest_time_s}};
   }
   json operator()(const TwistMotion& m) const {
     return {{"tool_T_frame", PoseRows(m.tool_T_frame)},
@@ -215,6 +216,7 @@ CompliantMotion CompliantOf(const json& item) {
   motion.time_limit_s = item["time_limit_s"].get<double>();
   motion.stiffness_n_m = VectorOf(item["stiffness_n_m"]);
   motion.rotational_stiffness_nm_rad = item["rotational_stiffness_nm_rad"].get<double>();
+  if (item.contains("rest_time_s")) motion.rest_time_s = item["rest_time_s"].get<double>();
   return motion;
 }
 

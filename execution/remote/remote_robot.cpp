@@ -287,15 +287,6 @@ VerdictReply RemoteRobot::Verdict() {
   return *verdict;
 }
 
-MotionResult RemoteRobot::LostResult() const {
-  MotionResult result;
-  const std::lock_guard lock(mutex_);
-  result.reason = StopReason::kAborted;
-  result.detail = "link lost: " + lost_;
-  result.world_T_tool = state_.world_T_tool;
-  return result;
-}
-
 MotionResult RemoteRobot::Move(const Request& request, double longest_m) {
   if (options_.cancellation != nullptr && options_.cancellation->cancelled()) {
     MotionResult result;
@@ -381,6 +372,21 @@ MotionResult RemoteRobot::Compliant(const CompliantMotion& motion) {
     if (whole.reason != StopReason::kReached && whole.reason != StopReason::kContact) break;
   }
   return whole;
+}
+
+ContactResponse RemoteRobot::Contact(const Eigen::Vector3d& direction) const {
+  // Asking goes over the link, and changes nothing of the robot.
+  const std::optional<Reply> reply = const_cast<RemoteRobot*>(this)->TryExchange(ContactRequest{direction});
+  const auto* told = reply ? std::get_if<ContactReply>(&*reply) : nullptr;
+  if (told == nullptr) return Robot::Contact(direction);
+  ContactResponse contact;
+  contact.held_mass_kg = told->held_mass_kg;
+  contact.free_mass_kg = told->free_mass_kg;
+  contact.stiffness_n_m = told->stiffness_n_m;
+  contact.damping_ratio = told->damping_ratio;
+  contact.reaction_time_s = told->reaction_time_s;
+  contact.force_noise_n = told->force_noise_n;
+  return contact;
 }
 
 MotionResult RemoteRobot::FollowTwist(const TwistMotion& motion) {

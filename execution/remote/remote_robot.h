@@ -48,6 +48,8 @@ class RemoteRobot final : public Robot {
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult Guarded(const GuardedMotion& motion) override;
   MotionResult Compliant(const CompliantMotion& motion) override;
+  /// Asks the robot; what a robot answers that does not know is up to it. The defaults once the link is lost.
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override;
   CameraView Look() override;
   MotionResult FollowTwist(const TwistMotion& motion) override;
 
@@ -81,7 +83,6 @@ class RemoteRobot final : public Robot {
   [[noreturn]] static void RefuseMessageOf(const std::string& what);
   void Pump();
   MotionResult Move(const Request& request, double longest_m);
-  MotionResult LostResult() const;
   void RequireState(const Reply& reply);
 
   RemoteOptions options_;

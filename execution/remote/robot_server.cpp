@@ -119,6 +119,7 @@ void RobotServer::TurnAway() {
   while (std::optional<Connection> other = listener_->Accept(0.0)) {
     ++statistics_.refused_sessions;
     other->Write(EncodeReply(WireForm::kJson, 0, ErrorReply{"busy", "another session is under way"}) + "\n", 0.01);
+    if (mode_ != RobotMode::kMoving) other->Finish();
   }
 }
 
@@ -231,13 +232,10 @@ std::optional<SessionEnd> RobotServer::Handle(const Framed<Request>& framed) {
       if (mode_ == RobotMode::kProtectiveStop) mode_ = RobotMode::kReady;
     } else if (std::holds_alternative<ZeroRequest>(request)) {
       served_.robot.ZeroWrench();
-    } else if (std::holds_alternative<ContactRequest>(request)) {
-      const Capabilities& c = served_.capabilities;
-      ContactReply contact;
-      contact.held_mass_kg = contact.free_mass_kg = c.effective_mass_kg;
-      contact.reaction_time_s = c.reaction_time_s;
-      contact.force_noise_n = c.force_noise_n;
-      Send(framed.seq, contact);
+    } else if (const auto* contact = std::get_if<ContactRequest>(&request)) {
+      const ContactResponse own = served_.robot.Contact(contact->direction);
+      Send(framed.seq, ContactReply{own.held_mass_kg, own.free_mass_kg, own.stiffness_n_m, own.damping_ratio,
+                                    own.reaction_time_s, own.force_noise_n});
       return std::nullopt;
     } else if (std::holds_alternative<LookRequest>(request)) {
       Send(framed.seq, PictureReply{served_.robot.Look()});

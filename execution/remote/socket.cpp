@@ -121,6 +121,19 @@ void Connection::Shutdown() {
   if (descriptor_ >= 0) shutdown(descriptor_, SHUT_RDWR);
 }
 
+void Connection::Finish() {
+  if (descriptor_ < 0) return;
+  constexpr double kMoment_s = 0.05;
+  shutdown(descriptor_, SHUT_WR);
+  const double end_s = MonotonicSeconds() + kMoment_s;
+  std::array<char, 16384> bytes{};
+  while (MonotonicSeconds() < end_s) {
+    const ssize_t got = recv(descriptor_, bytes.data(), bytes.size(), 0);
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) break;
+    if (got < 0) WaitFor(descriptor_, POLLIN, end_s - MonotonicSeconds());
+  }
+}
+
 bool Connection::TakeLine(std::string& line) {
   const std::size_t end = buffer_.find('\n', scanned_);
   if (end == std::string::npos) {

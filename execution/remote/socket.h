@@ -39,6 +39,8 @@ class Connection {
   bool HasLine() const { return buffer_.find('\n', scanned_) != std::string::npos; }
   /// Writes all of it. False if the other end is gone, or takes nothing for `timeout_s`.
   bool Write(std::string_view bytes, double timeout_s = 2.0);
+  /// Says no more, and takes what still comes for a moment: closing with bytes unread would lose the last words.
+  void Finish();
   /// Ends both directions at once; whoever waits to read is told kClosed.
   void Shutdown();
   void Close();

@@ -71,6 +71,7 @@ class EpisodeRunner {
 
   const EpisodeOptions& options() const { return options_; }
   const EpisodeFaults& faults() const { return noise_; }
+  double force_budget_n() const { return force_budget_n_; }
   /// The world of the runner, e.g. to watch it.
   env::InsertionEnv& environment() { return *environment_; }
 

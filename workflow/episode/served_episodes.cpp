@@ -82,6 +82,7 @@ execution::EpisodeReply ServedEpisodes::Begin(std::optional<std::uint64_t> episo
   }
   reply.world_T_estimate = record_.world_T_estimate0;
   reply.contact_threshold_n = runner_.faults().robot.contact_threshold_n;
+  reply.force_budget_n = runner_.force_budget_n();
   reply.failure = record_.reason;
   return reply;
 }
