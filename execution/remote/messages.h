@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -138,6 +139,7 @@ struct EpisodeReply {  ///< what an executor is told of an episode
 struct VerdictReply {
   Pose world_T_true = Pose::Identity();  ///< of the target
   bool truth_outside = false;
+  std::map<std::string, double> fault_values;  ///< what faults with ranges came to, in their units
   bool inserted = false;
   std::string reason;  ///< of the judge
   double depth_m = 0.0;

@@ -153,6 +153,7 @@ struct ReplyBody {
     return {{"type", "verdict"},
             {"true_pose", PoseRows(m.world_T_true)},
             {"truth_outside", m.truth_outside},
+            {"fault_values", m.fault_values},
             {"inserted", m.inserted},
             {"reason", m.reason},
             {"depth_m", m.depth_m},
@@ -316,6 +317,10 @@ VerdictReply VerdictOf(const json& item) {
   VerdictReply m;
   m.world_T_true = PoseOf(item["true_pose"]);
   m.truth_outside = item["truth_outside"].get<bool>();
+  for (const auto& [fault, value] : item["fault_values"].items()) {
+    if (!value.is_number()) throw InputError("robot message", "a fault's value is no number", "send numbers");
+    m.fault_values[fault] = value.get<double>();
+  }
   m.inserted = item["inserted"].get<bool>();
   m.reason = item["reason"].get<std::string>();
   m.depth_m = item["depth_m"].get<double>();
