@@ -162,9 +162,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   }
   ProgressBar map_bar("contact map");
   std::optional<workflow::AssemblyTasks> loaded;
-  session.OncePerHost([&] {
-    loaded = workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session));
-  });
+  session.OncePerHost(
+      [&] { loaded = workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session)); });
   const workflow::AssemblyTasks& tasks = *loaded;
   map_bar.Finish();
 
@@ -205,7 +204,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
       workflow::BuildAssemblies(assembly, plan, tasks, options, builds, jobs, on_record, bar.Callback());
     }
   } catch (const Interrupted&) {  // NOLINT(bugprone-empty-catch): by ranks that did not end in time
-  } catch (const InputError&) {  // of the output: what is there is cut off
+  } catch (const InputError&) {   // of the output: what is there is cut off
     throw;
   } catch (...) {  // of the world or the machine: what is done is kept
     if (out && !records.empty()) out->Commit();

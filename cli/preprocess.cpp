@@ -75,8 +75,7 @@ planner::PreprocessOptions OptionsOf(const workflow::PlanningSetup& setup, plann
 
 void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily& family,
               planner::PreprocessOptions options, const Flags& flags) {
-  if (options.solver.solver == planner::SolverKind::kERtdpBel &&
-      options.experience != planner::ExperienceKind::kNone) {
+  if (options.solver.solver == planner::SolverKind::kERtdpBel && options.experience != planner::ExperienceKind::kNone) {
     throw InputError("--estimate", "what e-rtdp-bel takes depends on the experience, which a sample does not have",
                      "give --experience none, or another --solver");
   }
@@ -166,8 +165,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   }
   std::optional<policies::DatabaseShard> part;
   if (shard) {
-    options.only =
-        std::make_shared<const std::vector<planner::Extents>>(workflow::ProblemsOfShard(family, *shard));
+    options.only = std::make_shared<const std::vector<planner::Extents>>(workflow::ProblemsOfShard(family, *shard));
     part = workflow::DatabaseShardOf(family, *shard);
   }
   const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out, part);

@@ -36,9 +36,9 @@
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/episode_video.h"
 #include "feeler/workflow/perception/perceive_table.h"
-#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/scale/ordered_pieces.h"
 #include "feeler/workflow/scale/shard.h"
+#include "feeler/workflow/setup/contact_speeds.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -259,7 +259,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   try {
     workflow::RunPiecesInOrder(episodes, jobs, session.ranks, make_worker, on_record, session.cancellation);
   } catch (const Interrupted&) {  // by ranks that did not end in time
-  } catch (const InputError&) {  // of the output: what is there is cut off
+  } catch (const InputError&) {   // of the output: what is there is cut off
     throw;
   } catch (...) {  // of the world or the machine: what is done is kept
     if (out && !rows.empty()) out->Commit();

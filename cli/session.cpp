@@ -15,9 +15,10 @@ void Session::OncePerHost(const std::function<void()>& load) const {
 }
 
 CLI::Option* AddShard(CLI::App& command, std::string& text, const std::string& of) {
-  return command.add_option("--shard", text,
-                            "I/N: part I of N, from 1, of " + of +
-                                "; auto: as the environment of a Slurm array, OpenMPI, PBS or Kubernetes says (docs/scale.md)");
+  return command.add_option(
+      "--shard", text,
+      "I/N: part I of N, from 1, of " + of +
+          "; auto: as the environment of a Slurm array, OpenMPI, PBS or Kubernetes says (docs/scale.md)");
 }
 
 std::optional<workflow::Shard> ShardOf(const std::string& text) {

@@ -74,12 +74,18 @@ EpisodeSummaryRow SummaryRow(const nlohmann::json& record) {
   };
   std::vector<std::string> rungs;
   for (const auto& rung : record.at("ladder")) rungs.push_back(rung.at("rung").get<std::string>());
-  return {record.at("task").get<std::string>(),      record.at("policy").get<std::string>(),
-          judged_or_believed("localized"), judged_or_believed("inserted"),
-          record.at("reason").get<std::string>(),    record.at("sim_time_s").get<double>(),
-          record.at("path_length_m").get<double>(),  record.at("policy_moves").get<double>(),
-          record.at("contacts").get<double>(),       record.at("peak_force_n").get<double>(),
-          record.at("timing").at("plan_cpu_s").get<double>(), std::move(rungs)};
+  return {record.at("task").get<std::string>(),
+          record.at("policy").get<std::string>(),
+          judged_or_believed("localized"),
+          judged_or_believed("inserted"),
+          record.at("reason").get<std::string>(),
+          record.at("sim_time_s").get<double>(),
+          record.at("path_length_m").get<double>(),
+          record.at("policy_moves").get<double>(),
+          record.at("contacts").get<double>(),
+          record.at("peak_force_n").get<double>(),
+          record.at("timing").at("plan_cpu_s").get<double>(),
+          std::move(rungs)};
 }
 
 std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {

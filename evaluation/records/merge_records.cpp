@@ -15,7 +15,6 @@
 namespace feeler::evaluation {
 namespace {
 
-
 struct File {
   std::string path;
   RecordsShard said;
@@ -35,8 +34,9 @@ void ReadLines(const File& file, std::map<std::int64_t, std::string>& lines) {
     }
     const auto episode = record["episode"].get<std::int64_t>();
     if (present >= expected.size() || episode != expected[present]) {
-      throw InputError(where, fmt::format("holds episode {}, which is not the next of shard {} of {}", episode,
-                                          file.said.shard.index, file.said.shard.count),
+      throw InputError(where,
+                       fmt::format("holds episode {}, which is not the next of shard {} of {}", episode,
+                                   file.said.shard.index, file.said.shard.count),
                        "run the shard again");
     }
     lines.emplace(episode, std::move(line));
@@ -99,15 +99,16 @@ std::string ShardFileOf(const std::string& records) { return records + ".shard.j
 
 void WriteRecordsShard(const std::string& records, const RecordsShard& shard) {
   const nlohmann::json text = {{"shard", {{"index", shard.shard.index}, {"count", shard.shard.count}}},
-                     {"episodes", shard.episodes},
-                     {"settings", shard.settings}};
+                               {"episodes", shard.episodes},
+                               {"settings", shard.settings}};
   WriteFileAtomically(ShardFileOf(records), text.dump(2) + "\n");
 }
 
 RecordsShard ReadRecordsShard(const std::string& records) {
   const std::string path = ShardFileOf(records);
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError(records, "is no shard: " + path + " is missing", "make it with feeler run --shard I/N --out");
+  if (!in)
+    throw InputError(records, "is no shard: " + path + " is missing", "make it with feeler run --shard I/N --out");
   try {
     const std::string text{std::istreambuf_iterator<char>(in), {}};
     if (IsNestedDeeper(text)) throw InputError(path, "is nested too deep", "run the shard again");

@@ -86,8 +86,7 @@ class Framework {
 
   void MarkWanted() {
     for (std::size_t k = 0; k < order_.size(); ++k) {
-      states_[k].wanted =
-          !options_.only || std::binary_search(options_.only->begin(), options_.only->end(), At(k));
+      states_[k].wanted = !options_.only || std::binary_search(options_.only->begin(), options_.only->end(), At(k));
       if (states_[k].wanted) ++summary_.problems;
     }
   }
@@ -165,7 +164,7 @@ class Framework {
         states_[k].progress = Progress::kRunning;
         return true;
       }
-      if (first_open_ < begin) continue;  // helpers were put on the list
+      if (first_open_ < begin) continue;                        // helpers were put on the list
       changed_.wait_for(lock, std::chrono::milliseconds(200));  // a cancellation notifies nobody
     }
   }

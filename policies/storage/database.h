@@ -17,7 +17,7 @@ namespace feeler::policies {
 
 /// One of `count` files that hold a family together.
 struct DatabaseShard {
-  int index = 1;              ///< from 1
+  int index = 1;  ///< from 1
   int count = 1;
   std::int64_t problems = 0;  ///< of the family that fall to this file
   std::int64_t family = 0;    ///< problems of the family

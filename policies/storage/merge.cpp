@@ -70,9 +70,10 @@ void RequireOneOrigin(const Database& first, const Database& other) {
     const std::string name = std::string_view(key) == "created_by"    ? "version of feeler"
                              : std::string_view(key) == "fingerprint" ? "geometry (fingerprint)"
                                                                       : key;
-    throw InputError(other.path(), fmt::format("was made with another {} than {} ({}, not {})", name, first.path(),
-                                               have.at(key), want.at(key)),
-                     "merge files that were made with one version, task and settings");
+    throw InputError(
+        other.path(),
+        fmt::format("was made with another {} than {} ({}, not {})", name, first.path(), have.at(key), want.at(key)),
+        "merge files that were made with one version, task and settings");
   }
 }
 
@@ -143,7 +144,8 @@ std::vector<Part> OpenParts(const std::vector<std::string>& paths) {
     RequireOneOrigin(first, *part.database);
     if (part.database->identity().shard.has_value() != first.identity().shard.has_value()) {
       const bool whole = first.identity().shard.has_value();
-      throw InputError(path, whole ? "is no shard, " + first.path() + " is one" : "is a shard, " + first.path() + " is none",
+      throw InputError(path,
+                       whole ? "is no shard, " + first.path() + " is one" : "is a shard, " + first.path() + " is none",
                        "merge shards with shards");
     }
   }

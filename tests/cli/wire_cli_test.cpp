@@ -141,9 +141,8 @@ TEST(WireCli, ADryRunPrintsMotionsAndMovesNothing) {
 
 TEST(WireCli, WhatGoesWrongIsTheReasonAndTheNextEpisodeIsSound) {
   const std::string out = ScratchFolder("wire_faults") + "/records.jsonl";
-  Simulation simulation(
-      {"--seed", "5", "--episodes", "8", "--no-replay", "--faults",
-       "drop=0.3,stall=0.3,protective=0.2,malformed=0.2,half=0.2,nan=0.1,backwards=0.1,jump=0.1"});
+  Simulation simulation({"--seed", "5", "--episodes", "8", "--no-replay", "--faults",
+                         "drop=0.3,stall=0.3,protective=0.2,malformed=0.2,half=0.2,nan=0.1,backwards=0.1,jump=0.1"});
   const CommandResult executed = RunFeeler(Execute(simulation.address(), {"--out", out, "--json"}));
   EXPECT_EQ(executed.exit_code, 0) << executed.err;
   const Json seen = simulation.Stop();

@@ -25,8 +25,8 @@ struct JobForecast {
 
 /// Plays the job on so many ranks: each takes the next piece when it is free (ranks other than 0 have one more at hand
 /// where there are many pieces, as Ranks::LanesFor has it), rank 0 commits results in the order in which they come.
-/// Laws: wall >= start + work / ranks, start + longest, all commits; on one rank wall = start + work + commits. Ranks at
-/// least 1.
+/// Laws: wall >= start + work / ranks, start + longest, all commits; on one rank wall = start + work + commits. Ranks
+/// at least 1.
 JobForecast Simulate(const JobModel& model, int ranks);
 
 }  // namespace feeler::workflow

@@ -86,16 +86,16 @@ planner::SolverResult SolverResultFrom(const std::string& bytes) {
 std::vector<planner::DistantSolver> DistantSolvers(Ranks& ranks, std::size_t problems) {
   std::vector<planner::DistantSolver> solvers;
   for (int lane = 0; lane < ranks.LanesFor(problems); ++lane) {
-    solvers.push_back([&ranks, lane](const planner::Extents& extents,
-                                     const std::optional<planner::SimilarProblem>& similar) {
-      try {
-        return SolverResultFrom(ranks.Call(lane, ToBytes(ProblemRequest{extents, similar})));
-      } catch (const Interrupted&) {
-        planner::SolverResult given_up;
-        given_up.status = planner::SolverStatus::kCancelled;
-        return given_up;
-      }
-    });
+    solvers.push_back(
+        [&ranks, lane](const planner::Extents& extents, const std::optional<planner::SimilarProblem>& similar) {
+          try {
+            return SolverResultFrom(ranks.Call(lane, ToBytes(ProblemRequest{extents, similar})));
+          } catch (const Interrupted&) {
+            planner::SolverResult given_up;
+            given_up.status = planner::SolverStatus::kCancelled;
+            return given_up;
+          }
+        });
   }
   return solvers;
 }

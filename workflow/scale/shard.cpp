@@ -29,7 +29,8 @@ std::optional<std::int64_t> Variable(const Environment& environment, const char*
   const char* text = environment(name);
   if (text == nullptr || *text == '\0') return std::nullopt;
   const std::optional<std::int64_t> value = Number(text);
-  if (!value) throw InputError(name, fmt::format("\"{}\" is not a whole number", text), "leave --shard to the scheduler");
+  if (!value)
+    throw InputError(name, fmt::format("\"{}\" is not a whole number", text), "leave --shard to the scheduler");
   return value;
 }
 
@@ -78,8 +79,9 @@ Shard FromScheduler(std::optional<std::int64_t> count, const Environment& enviro
     if (!index) continue;
     if (!told) count = Variable(environment, "FEELER_SHARD_COUNT");
     if (!count) throw InputError("--shard", fmt::format("{} does not tell of how many", name), "give auto/N");
-    return Checked(*index - first.value_or(from) + 1, *count, name,
-                   "count from 0 to N-1 on Kubernetes and from 1 to N on PBS, or let FEELER_SHARD_FIRST say from where");
+    return Checked(
+        *index - first.value_or(from) + 1, *count, name,
+        "count from 0 to N-1 on Kubernetes and from 1 to N on PBS, or let FEELER_SHARD_FIRST say from where");
   }
   throw InputError("--shard", "auto: no scheduler's variables in the environment",
                    "give I/N, or run it in a Slurm or PBS array, under mpirun, or in an indexed Kubernetes job");
@@ -110,9 +112,7 @@ Shard ParseShard(const std::string& text) {
   return ParseShard(text, [](const char* name) -> const char* { return std::getenv(name); });
 }
 
-double PredictedCost(const planner::Extents& extents) {
-  return static_cast<double>(extents.Count()) + kFixedCost;
-}
+double PredictedCost(const planner::Extents& extents) { return static_cast<double>(extents.Count()) + kFixedCost; }
 
 std::vector<planner::Extents> ProblemsOfShard(const planner::ProblemFamily& family, const Shard& shard) {
   std::vector<planner::Extents> longest_first = family.problems;

@@ -1,5 +1,5 @@
-// Room for contacts. Laws: parts of a few boxes stay near the defaults; wherever a tool is pressed on a target of hundreds
-// of pieces, MuJoCo finds room for all contacts and rows; whoever sets the sizes keeps them.
+// Room for contacts. Laws: parts of a few boxes stay near the defaults; wherever a tool is pressed on a target of
+// hundreds of pieces, MuJoCo finds room for all contacts and rows; whoever sets the sizes keeps them.
 #include "feeler/env/scene/contact_capacity.h"
 
 #include <gtest/gtest.h>

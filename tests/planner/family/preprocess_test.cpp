@@ -1,6 +1,7 @@
 // Laws of preprocessing: every problem of the family ends in the sink, once; policies are the same for one and several
-// threads, on distant solvers, in parts of the family, and when a run is cut into two; an experience never breaks the bound; a cancelled run stores only finished
-// problems; a limit that was set is kept, and only the certified solver is given one that was not.
+// threads, on distant solvers, in parts of the family, and when a run is cut into two; an experience never breaks the
+// bound; a cancelled run stores only finished problems; a limit that was set is kept, and only the certified solver is
+// given one that was not.
 
 #include "feeler/planner/family/preprocess.h"
 
@@ -97,7 +98,6 @@ TEST_P(Preprocessing, SameForAnyThreadsAndAfterResume) {
   EXPECT_EQ(rest.skipped + rest.complete, 12);
   ExpectSame(serial, resumed);
 }
-
 
 TEST_P(Preprocessing, PartsAreThoseOfTheWhole) {
   const Task task = testing::MakePlugTask();

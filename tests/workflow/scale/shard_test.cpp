@@ -1,6 +1,6 @@
 // Laws of shards: every problem and every number falls to exactly one shard; the split depends on family and count
-// alone; predicted costs differ by no more than that of a problem; schedulers' variables, whatever they count from, give
-// I/N, and what is out of range or missing is refused.
+// alone; predicted costs differ by no more than that of a problem; schedulers' variables, whatever they count from,
+// give I/N, and what is out of range or missing is refused.
 #include "feeler/workflow/scale/shard.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,8 @@ Shard Parse(const std::string& text, const std::map<std::string, std::string>& v
 TEST(ParseShard, TakesIOfN) {
   EXPECT_EQ(Parse("2/3"), (Shard{2, 3}));
   EXPECT_EQ(Parse("1/1"), (Shard{1, 1}));
-  for (const char* bad : {"", "0/3", "4/3", "-1/3", "1/0", "1", "/3", "1/", "1/3x", " 1/3", "1.5/3", "2/9999999", "auto"}) {
+  for (const char* bad :
+       {"", "0/3", "4/3", "-1/3", "1/0", "1", "/3", "1/", "1/3x", " 1/3", "1.5/3", "2/9999999", "auto"}) {
     EXPECT_THROW(Parse(bad), InputError) << bad;
   }
 }
