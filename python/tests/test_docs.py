@@ -41,7 +41,7 @@ def test_notebooks_run_and_hold_no_outputs(path, tmp_path):
         if cell.cell_type == "code"
     )
     nbclient.NotebookClient(
-        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": tmp_path}}
+        notebook, timeout=600, startup_timeout=600, kernel_name="python3", resources={"metadata": {"path": tmp_path}}
     ).execute()
 
 

@@ -22,7 +22,9 @@ def _doc(value: object) -> str:
 
 def reference() -> str:
     """The page as text."""
-    parts = ["# Reference of the Python package\nMade from the docstrings by `python/tools/reference.py`; do not edit.\n"]
+    parts = [
+        "# Reference of the Python package\nMade from the docstrings by `python/tools/reference.py`; do not edit.\n"
+    ]
     for name in feeler.__all__:
         value = getattr(feeler, name)
         if not callable(value):
