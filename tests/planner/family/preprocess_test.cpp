@@ -147,9 +147,12 @@ TEST_P(Preprocessing, DistantSolversChangeNothing) {
       return elsewhere.Solve(extents, similar);
     });
   }
-  MemorySink together;
-  EXPECT_EQ(Preprocess(task, map, family, options, together).complete, 12);
-  ExpectSame(alone, together);
+  // Who is first is chance: on a busy machine one may do all of a run.
+  for (int run = 0; run < 20 && calls == 0; ++run) {
+    MemorySink together;
+    EXPECT_EQ(Preprocess(task, map, family, options, together).complete, 12);
+    ExpectSame(alone, together);
+  }
   EXPECT_GT(calls, 0);
 }
 
