@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -21,7 +22,8 @@ using ::testing::HasSubstr;
 class DataFolder : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / "data_folder_test";
+    folder_ =
+        fs::path(::testing::TempDir()) / ("data_folder_test_" + std::to_string(::getpid()));  // tests run side by side
     fs::create_directories(folder_ / "given" / "models");
     fs::create_directories(folder_ / "variable" / "models");
     fs::create_directories(folder_ / "named");

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -41,7 +42,7 @@ std::string ErrorOf(const std::string& path) {
 class Bundle : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / "bundle_test";
+    folder_ = fs::path(::testing::TempDir()) / ("bundle_test_" + std::to_string(::getpid()));  // tests run side by side
     fs::create_directories(folder_);
     path_ = (folder_ / "plug.db.bundle").string();
   }
