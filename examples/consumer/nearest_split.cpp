@@ -50,8 +50,8 @@ class NearestSplit {
         for (const Hypothesis& h : left) branch.probability += h.weight;
         branch.probability /= weight;
         branch.next = Node(robot + answer.first * UnitCell(node.move.direction), left);
-        node.expected_cost +=
-            branch.probability * (problem_.cost.Of(branch.outcome) + graph_.nodes[branch.next].expected_cost);
+        node.expected_cost += branch.probability * (problem_.cost.Of(branch.outcome, node.move.direction) +
+                                                    graph_.nodes[branch.next].expected_cost);
         node.branches.push_back(branch);
       }
     }

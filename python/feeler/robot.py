@@ -65,8 +65,15 @@ class Robot(ABC):
         time_limit_s: float,
         stiffness_n_m: NDArray[np.float64],
         rotational_stiffness_nm_rad: float,
+        rest_time_s: float,
     ) -> MotionResult:
         """Compliant motion through way points (Cartesian impedance; stiffness in tool axes)."""
+
+    def contact(self, direction: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """What a contact met along a unit vector (world axes) is like as the robot stands: effective mass where the tool
+        cannot turn (kg), where it can (kg), stiffness of the parts (N/m), damping ratio, reaction time (s), force noise (N).
+        The speed of probes follows from it. None: a heavy arm with hard parts is assumed."""
+        return None
 
     def look(self) -> CameraView:
         """What the camera on the wrist sees; without one: an empty view."""
@@ -121,10 +128,20 @@ class ForwardingRobot(Robot):
         time_limit_s: float,
         stiffness_n_m: NDArray[np.float64],
         rotational_stiffness_nm_rad: float,
+        rest_time_s: float,
     ) -> MotionResult:
         return self.robot.compliant(
-            world_T_tool, speed_m_s, force_limit_n, time_limit_s, stiffness_n_m, rotational_stiffness_nm_rad
+            world_T_tool,
+            speed_m_s,
+            force_limit_n,
+            time_limit_s,
+            stiffness_n_m,
+            rotational_stiffness_nm_rad,
+            rest_time_s,
         )
+
+    def contact(self, direction: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        return self.robot.contact(direction)
 
     def look(self) -> CameraView:
         return self.robot.look()

@@ -80,6 +80,7 @@ class _Turned(Robot):
         time_limit_s: float,
         stiffness_n_m: Any,
         rotational_stiffness_nm_rad: float,
+        rest_time_s: float,
     ) -> MotionResult:
         return self._do(
             "compliant",
@@ -89,6 +90,7 @@ class _Turned(Robot):
             time_limit_s=time_limit_s,
             stiffness_n_m=stiffness_n_m,
             rotational_stiffness_nm_rad=rotational_stiffness_nm_rad,
+            rest_time_s=rest_time_s,
         )
 
 

@@ -67,6 +67,7 @@ class Labelled final : public Robot {
     track_.motion = 3;
     return robot_.Compliant(motion);
   }
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override { return robot_.Contact(direction); }
   CameraView Look() override { return robot_.Look(); }
   MotionResult FollowTwist(const TwistMotion& motion) override {
     track_.motion = 4;

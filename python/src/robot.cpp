@@ -96,7 +96,19 @@ class PythonRobot final : public Robot {
       nb::list way;
       for (const Pose& pose : m.world_T_tool) way.append(M(pose));
       return Attr("compliant")(way, m.speed_m_s, m.force_limit_n, m.time_limit_s, m.stiffness_n_m,
-                               m.rotational_stiffness_nm_rad);
+                               m.rotational_stiffness_nm_rad, m.rest_time_s);
+    });
+  }
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override {
+    return Ask(raised_, "robot", "contact", [&] {
+      const nb::object told = Attr("contact")(direction);
+      if (told.is_none()) return Robot::Contact(direction);
+      const auto v = nb::cast<Eigen::Matrix<double, 6, 1>>(told);
+      if (!v.allFinite() || (v.array() < 0.0).any()) {
+        throw InputError("robot.contact", "is not six finite numbers, none below zero",
+                         "give held mass, free mass, stiffness, damping ratio, reaction time, force noise, or None");
+      }
+      return ContactResponse{v[0], v[1], v[2], v[3], v[4], v[5]};
     });
   }
   CameraView Look() override {
@@ -287,7 +299,8 @@ void BindSimulatedRobot(nb::module_& m) {
       .def(
           "compliant",
           [](SimulatedRobot& r, const std::vector<Eigen::Matrix4d>& way, double speed_m_s, double force_limit_n,
-             double time_limit_s, const Eigen::Vector3d& stiffness_n_m, double rotational_stiffness_nm_rad) {
+             double time_limit_s, const Eigen::Vector3d& stiffness_n_m, double rotational_stiffness_nm_rad,
+             double rest_time_s) {
             CompliantMotion motion;
             for (const Eigen::Matrix4d& pose : way) motion.world_T_tool.push_back(ToPose(pose, "compliant"));
             motion.speed_m_s = speed_m_s;
@@ -295,10 +308,21 @@ void BindSimulatedRobot(nb::module_& m) {
             motion.time_limit_s = time_limit_s;
             motion.stiffness_n_m = stiffness_n_m;
             motion.rotational_stiffness_nm_rad = rotational_stiffness_nm_rad;
+            motion.rest_time_s = rest_time_s;
             return Released([&] { return r.Compliant(motion); });
           },
           "world_T_tool"_a, "speed_m_s"_a = 0.02, "force_limit_n"_a = 60.0, "time_limit_s"_a = 10.0,
-          "stiffness_n_m"_a = Eigen::Vector3d(1000, 1000, 4000), "rotational_stiffness_nm_rad"_a = 200.0)
+          "stiffness_n_m"_a = Eigen::Vector3d(1000, 1000, 4000), "rotational_stiffness_nm_rad"_a = 200.0,
+          "rest_time_s"_a = 0.05)
+      .def(
+          "contact",
+          [](const SimulatedRobot& r, const Eigen::Vector3d& direction) {
+            const ContactResponse c = r.Contact(direction);
+            Eigen::Matrix<double, 6, 1> v;
+            v << c.held_mass_kg, c.free_mass_kg, c.stiffness_n_m, c.damping_ratio, c.reaction_time_s, c.force_noise_n;
+            return v;
+          },
+          "direction"_a)
       .def("look",
            [](SimulatedRobot& r) {
              const nb::gil_scoped_release released;
