@@ -17,14 +17,14 @@ namespace {
 using fmt::format_to;
 
 /// Largest file that is written, and the steps beyond which it cannot be smaller (a step takes 40 bytes and more).
-constexpr std::size_t kMaxBytes = 400'000'000;
-constexpr std::size_t kMaxSteps = kMaxBytes / 40;
+/// No transition is written in fewer.
+constexpr std::size_t kBytesPerStep = 40;
 
 /// To be asked while the text grows.
-void RequireSize(const planner::Problem& problem, const std::string& text) {
-  if (text.size() <= kMaxBytes) return;
+void RequireSize(const planner::Problem& problem, const PomdpOptions& options, const std::string& text) {
+  if (text.size() <= options.max_bytes) return;
   throw InputError(problem.name.empty() ? "problem" : problem.name,
-                   fmt::format("takes more than {} MB", kMaxBytes / 1'000'000), "export a smaller problem");
+                   fmt::format("takes more than {} MB", options.max_bytes / 1'000'000), "export a smaller problem");
 }
 
 /// A bound below the optimal cost would make wrong declarations pay: the exported problem would be another one.
@@ -51,7 +51,7 @@ PomdpModel MakeModel(const planner::Problem& problem, const PomdpOptions& option
     throw InputError("upper bound", fmt::format("is {}", options.upper_bound), "give the cost of a policy");
   }
   if (std::isfinite(options.upper_bound)) RequireUpperBound(problem, options.upper_bound);
-  return MakePomdpModel(problem, options.upper_bound, kMaxSteps);
+  return MakePomdpModel(problem, options.upper_bound, options.max_bytes / kBytesPerStep);
 }
 
 /// A decimal number with digits on both sides of the point, as Cassandra's format wants them, that reads back exactly.
@@ -125,7 +125,7 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     const std::string name = model.MoveName(m);
     for (std::size_t r = 0; r < cells; ++r) {
-      RequireSize(problem, text);
+      RequireSize(problem, options, text);
       for (std::size_t h = 0; h < hypotheses; ++h) {
         const PomdpModel::Step& step = model.At(m, r, h);
         format_to(out, "T: {} : {} : {} 1.0\n", name, state(r, h), state(static_cast<std::size_t>(step.cell), h));
@@ -138,7 +138,7 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
     const std::string name = model.DeclarationName(d);
     format_to(out, "T: {} : * : done 1.0\n", name);
     for (std::size_t r = 0; r < cells; ++r) {
-      RequireSize(problem, text);
+      RequireSize(problem, options, text);
       for (std::size_t h = 0; h < hypotheses; ++h) {
         if (Contains(model.declarations[d], h)) continue;
         format_to(out, "R: {} : {} : * : * {}\n", name, state(r, h), Decimal(-model.penalty));
@@ -149,7 +149,7 @@ std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& opt
     for (std::size_t h = 0; h < hypotheses; ++h) format_to(out, "O: * : {} : {} 1.0\n", state(r, h), cell_names[r]);
   }
   text += "O: * : done : end 1.0\n";
-  RequireSize(problem, text);
+  RequireSize(problem, options, text);
   return text;
 }
 
@@ -202,7 +202,7 @@ std::string FormatPomdpx(const planner::Problem& problem, const PomdpOptions& op
   text += Entry("* done * done", "ProbTable", "1.0");
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     for (std::size_t r = 0; r < cells; ++r) {
-      RequireSize(problem, text);
+      RequireSize(problem, options, text);
       ForEachDistinct(
           hypotheses, [&](std::size_t h) { return model.At(m, r, h).cell; },
           [&](const std::string& h, int next) {
@@ -225,7 +225,7 @@ std::string FormatPomdpx(const planner::Problem& problem, const PomdpOptions& op
   text += "  <Func><Var>reward</Var><Parent>action robot_0 target_0</Parent><Parameter type=\"TBL\">\n";
   for (std::size_t m = 0; m < model.moves.size(); ++m) {
     for (std::size_t r = 0; r < cells; ++r) {
-      RequireSize(problem, text);
+      RequireSize(problem, options, text);
       ForEachDistinct(
           hypotheses, [&](std::size_t h) { return model.At(m, r, h).cost; },
           [&](const std::string& h, double cost) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <string>
 
@@ -22,6 +23,8 @@ struct PomdpOptions {
   /// Refused where it is below the proven lower bound of a solver (20,000 expansions).
   /// Infinity: a bound is worked out from the problem.
   double upper_bound = std::numeric_limits<double>::infinity();
+  /// Bytes; a file that would be larger is refused before it is written.
+  std::size_t max_bytes = 400'000'000;
 };
 
 /// Cost of a wrong declaration: at least (bound of the optimal cost) / (smallest normalised weight), rounded up. A
@@ -30,7 +33,8 @@ struct PomdpOptions {
 double DeclarePenalty(const planner::Problem& problem, const PomdpOptions& options = {});
 
 /// Cassandra's `.pomdp` format, `values: reward` (negated costs: solvers that ignore the line maximise), one flat state
-/// space. Throws InputError if options are out of range or the file would exceed 400 MB, NegativeResult as above.
+/// space. Throws InputError if options are out of range or the file would exceed
+/// `max_bytes`, NegativeResult as above.
 std::string FormatPomdp(const planner::Problem& problem, const PomdpOptions& options = {});
 
 /// POMDPX 1.0 with mixed observability: the robot cell a fully observed variable, the hypothesis a hidden one; rewards

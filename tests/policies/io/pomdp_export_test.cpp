@@ -323,9 +323,17 @@ TEST(PomdpExport, RefusesWhatItCannotSay) {
     EXPECT_THROW(FormatPomdp(small, {discount, kInfinity}), InputError);
   }
   EXPECT_THROW(FormatPomdpx(small, {1.0, -1.0}), InputError);
-  EXPECT_THROW(FormatPomdp(read("block125")), InputError);
+  PomdpOptions few;
+  few.max_bytes = 4'000'000;
+  EXPECT_THROW(FormatPomdp(read("block125"), few), InputError);
+  // The limit is that of the text to the byte, not of an estimate of it.
   const planner::Problem slot = read("slot2d");
-  EXPECT_GT(FormatPomdp(slot).size(), 100'000U);
+  const std::size_t size = FormatPomdp(slot).size();
+  EXPECT_GT(size, 100'000U);
+  few.max_bytes = size;
+  EXPECT_EQ(FormatPomdp(slot, few).size(), size);
+  few.max_bytes = size - 1;
+  EXPECT_THROW(FormatPomdp(slot, few), InputError);
 }
 
 }  // namespace
