@@ -12,18 +12,19 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
-#include <chrono>
 #include <exception>
 #include <functional>
-#include <future>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "feeler/core/direction.h"
 #include "feeler/core/error.h"
 #include "feeler/core/pose.h"
 #include "feeler/core/progress.h"
+#include "interruptible.h"
 
 /// What the binding's sources share. Errors of the library reach Python as feeler.InputError and its sisters; Python's
 /// own, raised in a callback, come back out as they are.
@@ -60,33 +61,23 @@ nb::object NewArray(std::vector<T>&& values, std::vector<std::size_t> shape) {
   return nb::cast(nb::ndarray<nb::numpy, T>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-/// Runs `work` on a thread of its own, without the interpreter's lock, while this one listens for signals: Ctrl-C
-/// cancels, waits for the work to end, and raises KeyboardInterrupt. Exceptions of `work` come out here.
-template <class Work>
-auto RunInterruptibly(CancellationToken& token, Work&& work) {
-  auto future = std::async(std::launch::async, std::forward<Work>(work));
-  bool stopped = false;
-  nb::gil_scoped_release released;
-  while (future.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
-    if (stopped) continue;
-    const nb::gil_scoped_acquire acquired;
-    if (PyErr_CheckSignals() != 0) {
-      stopped = true;
-      token.Cancel();
-      // The exception that is set belongs to this thread; it is raised again when the work has ended.
-      PyErr_Clear();
-    }
+/// An entry of a dict of options; none: not given. Throws InputError that names the key.
+template <class T>
+std::optional<T> Take(const nb::dict& options, const char* key) {
+  if (!options.contains(key) || options[key].is_none()) return std::nullopt;
+  T value;
+  if (!nb::try_cast(options[key], value)) {
+    throw InputError(key, std::string("has the wrong type (") + nb::type_name(options[key].type()).c_str() + ")",
+                     "see its documentation");
   }
-  if (stopped) {
-    try {
-      future.get();
-    } catch (...) {  // NOLINT: what the cancelled work says is of no interest
-    }
-    const nb::gil_scoped_acquire acquired;
-    PyErr_SetNone(PyExc_KeyboardInterrupt);
-    throw nb::python_error();
-  }
-  return future.get();
+  return value;
+}
+
+/// A direction by its name. Throws InputError.
+inline Direction ToDirection(const std::string& name) {
+  const auto direction = ParseDirection(name);
+  if (!direction) throw InputError("direction", "unknown \"" + name + "\"", "choose +x, -x, +y, -y, +z or -z");
+  return *direction;
 }
 
 /// A callback of Python as progress callback: `callback(done, total)`; None: nothing. Returning False asks to stop, as
@@ -112,6 +103,8 @@ class Held {
 /// The first exception that Python code raised inside of a run which the library must not take for its own.
 struct Raised {
   std::exception_ptr error;
+  /// Cancelled: no more of Python's methods are called, which ends the run; none: they always are.
+  const CancellationToken* stop = nullptr;
   /// Call in a catch clause with the lock held.
   void Keep() {
     if (!error) error = std::current_exception();

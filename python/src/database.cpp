@@ -91,7 +91,7 @@ nb::tuple Preprocess(PlanningTask& task, const nb::object& family_given, const n
     }
   }
   if (!found) throw InputError("experience", "unknown name \"" + experience + "\"", "choose rollout, naive or none");
-  options.jobs = Parallelism(jobs);
+  options.jobs = Threads(jobs);
   options.cancellation = &token;
   Raised raised;
   const ProgressCallback inner = ToProgress(progress, token);
@@ -219,7 +219,7 @@ void BindDatabase(nb::module_& m) {
             const ProgressCallback callback = ToProgress(progress, token);
             const workflow::DatabaseVerification v = RunInterruptibly(token, [&] {
               d.Verify();
-              return workflow::VerifyDatabase(*setup, d, Parallelism(jobs), callback, &token);
+              return workflow::VerifyDatabase(*setup, d, Threads(jobs), callback, &token);
             });
             nb::dict out;
             out["problems"] = v.problems;

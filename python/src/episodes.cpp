@@ -138,8 +138,8 @@ nb::tuple Run(PlanningTask& task, const nb::object& policy, const std::shared_pt
     RunInterruptibly(token, [&] {
       const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
       const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, factory, options); };
-      return workflow::RunEpisodes(workflow::EpisodeRange(first, first + episodes), Parallelism(jobs), make_runner,
-                                   take, report, &token);
+      return workflow::RunEpisodes(workflow::EpisodeRange(first, first + episodes), Threads(jobs), make_runner, take,
+                                   report, &token);
     });
   } catch (const InputError&) {
     raised->Rethrow();

@@ -5,7 +5,6 @@
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
-#include <future>
 
 #include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
@@ -14,38 +13,13 @@
 #include "feeler/core/progress.h"
 #include "feeler/evaluation/registry.h"
 #include "feeler/evaluation/report/page.h"
+#include "interruptible.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;  // NOLINT
 
 namespace feeler::python {
 namespace {
-
-/// As RunInterruptibly of the first module (common.h): Ctrl-C cancels.
-template <class Work>
-auto Run(CancellationToken& token, Work&& work) {
-  auto future = std::async(std::launch::async, std::forward<Work>(work));
-  bool stopped = false;
-  nb::gil_scoped_release released;
-  while (future.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
-    if (stopped) continue;
-    const nb::gil_scoped_acquire acquired;
-    if (PyErr_CheckSignals() == 0) continue;
-    PyErr_Clear();
-    stopped = true;
-    token.Cancel();
-  }
-  if (stopped) {
-    try {
-      future.get();
-    } catch (...) {  // NOLINT: what the cancelled work says is of no interest
-    }
-    const nb::gil_scoped_acquire acquired;
-    PyErr_SetNone(PyExc_KeyboardInterrupt);
-    throw nb::python_error();
-  }
-  return future.get();
-}
 
 nb::dict RunExperiment(const std::string& name, const std::string& out, bool quick, int jobs, const std::string& task,
                        std::uint64_t seed, int solver_seeds, const std::string& command, const nb::object& progress) {
@@ -54,7 +28,7 @@ nb::dict RunExperiment(const std::string& name, const std::string& out, bool qui
   evaluation::ExperimentRequest request;
   request.out = out;
   request.quick = quick;
-  request.jobs = Parallelism(jobs);
+  request.jobs = Threads(jobs);
   request.task = task;
   request.seed = seed;
   request.solver_seeds = solver_seeds;
@@ -72,7 +46,7 @@ nb::dict RunExperiment(const std::string& name, const std::string& out, bool qui
     }
   };
   const evaluation::ExperimentOutcome outcome =
-      Run(token, [&] { return evaluation::RunExperiment(experiment, request); });
+      RunInterruptibly(token, [&] { return evaluation::RunExperiment(experiment, request); });
   if (raised) std::rethrow_exception(raised);
   nb::dict d;
   d["complete"] = outcome.complete;

@@ -1,8 +1,13 @@
 #pragma once
 
-#include <map>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <initializer_list>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "common.h"
 #include "feeler/planner/solve.h"
@@ -33,13 +38,28 @@ class PlanningTask {
 planner::Extents ToExtents(const nb::object& extents, const Task& task);
 planner::ProblemFamily ToFamily(const nb::object& family, const Task& task);
 
-/// Options of a solver from a dict: those of `feeler solve`. `token` and `raised` outlive the run.
+/// Options of a solver from a dict: those of `feeler solve`. `token` outlives the run.
 planner::SolverOptions ToSolverOptions(const nb::dict& options, CancellationToken& token);
+
+/// The one of `kinds` with this name.
+template <class Kind>
+Kind Named(const std::string& name, const char* what, std::initializer_list<Kind> kinds) {
+  std::vector<std::string_view> names;
+  for (const Kind kind : kinds) {
+    if (ToString(kind) == name) return kind;
+    names.push_back(ToString(kind));
+  }
+  throw InputError(what, "unknown name \"" + name + "\"", fmt::format("choose {}", fmt::join(names, ", ")));
+}
 
 /// A policy graph with the problem it belongs to.
 struct BoundPolicy {
   std::shared_ptr<const planner::Problem> problem;
   std::shared_ptr<const planner::PolicyGraph> graph;
 };
+
+/// Parts of BindPlanner.
+void BindProblem(nb::module_& module);
+void BindPolicy(nb::module_& module);
 
 }  // namespace feeler::python

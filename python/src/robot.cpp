@@ -28,6 +28,7 @@ StopReason ParseReason(const std::string& name) {
 /// Calls Python with the lock held. What it raises is kept; the library is told by an InputError, which it passes on.
 template <class Call>
 auto Ask(const std::shared_ptr<Raised>& raised, const char* who, const char* method, Call&& call) {
+  if (raised->stop != nullptr && raised->stop->cancelled()) throw InputError(who, "was stopped");
   const nb::gil_scoped_acquire acquired;
   try {
     return call();
@@ -366,6 +367,7 @@ nb::object Execute(PlanningTask& task, const nb::object& extents_given, const Ei
   record.extents = extents;
   record.world_T_estimate0 = world_T_estimate;
   CancellationToken token;
+  raised->stop = &token;
   try {
     record.execution = RunInterruptibly(token, [&]() -> execution::ExecutionRecord {
       const MotionResult transfer =

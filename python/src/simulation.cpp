@@ -11,17 +11,6 @@
 namespace feeler::python {
 namespace {
 
-template <class T>
-std::optional<T> Take(const nb::dict& options, const char* key) {
-  if (!options.contains(key) || options[key].is_none()) return std::nullopt;
-  T value;
-  if (!nb::try_cast(options[key], value)) {
-    throw InputError(key, std::string("has the wrong type (") + nb::type_name(options[key].type()).c_str() + ")",
-                     "see the documentation of reset");
-  }
-  return value;
-}
-
 void RequireKnown(const nb::dict& options, std::initializer_list<const char*> known) {
   for (const auto& [key, value] : options) {
     const std::string name = nb::str(key).c_str();

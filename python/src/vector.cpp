@@ -257,7 +257,7 @@ void BindVector(nb::module_& m) {
              const std::string& autoreset_mode, const nb::dict& options) {
             env::VectorEnvOptions v;
             v.environments = environments;
-            v.threads = Parallelism(threads);
+            v.threads = Threads(threads, "threads");
             v.auto_reset = ParseMode(autoreset_mode);
             v.env = ToEnvOptions(options, *scene);
             new (self) Vector(std::move(scene), CodecFrom(options), v);

@@ -304,12 +304,12 @@ def test_a_window_needs_a_display(monkeypatch):
         env.reset(seed=1)
 
 
-def test_checker_of_learners():
+@pytest.mark.parametrize("name", IDS)
+def test_checker_of_learners(name):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    for name in QUICK:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            checker.check_env(gymnasium.make(name).unwrapped, skip_render_check=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(gymnasium.make(name).unwrapped, skip_render_check=True)
 
 
 def test_import_loads_little():

@@ -185,6 +185,7 @@ def test_frames_and_files(database, tmp_path):
         ({"policy": "magic"}, "magic"),
         ({"policy": 3}, "type int"),
         ({"policy": "spiral", "episodes": 0}, "episodes"),
+        ({"policy": "spiral", "jobs": -1}, "jobs"),
         ({"policy": "spiral", "noise": "earthquake"}, "earthquake"),
         ({"policy": "spiral", "placement": "moon"}, "moon"),
         ({"policy": "spiral", "policy_options": {"colour": "red"}}, "colour"),

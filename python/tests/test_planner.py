@@ -161,6 +161,8 @@ def test_preprocessing_stops_and_resumes(plug, tmp_path):
         (lambda: feeler.solve("plug", (3, 3, 3), gap=float("nan")), "gap"),
         (lambda: feeler.solve("plug", (3, 3, 3), solver="magic"), "magic"),
         (lambda: feeler.solve("plug", (3, 3, 3), speed=3), "unknown option"),
+        (lambda: feeler.solve("plug", (3, 3, 3), jobs=0), "jobs"),
+        (lambda: feeler.preprocess("plug", "never.db", "2x2x2", jobs=2000), "jobs"),
         (lambda: feeler.solve("plug", (3, 3, 3), gap="wide"), "wrong type"),
         (lambda: feeler.solve(voxel_problem(), (3, 3, 3)), "extents"),
         (lambda: voxel_problem(hypotheses=[[0.5, 0, 0]]), "whole"),

@@ -142,6 +142,7 @@ def test_bad_arguments_and_life_after_close():
     for kwargs, what in [
         ({"threads": 1, "autoreset_mode": "later"}, "later"),
         ({"render_mode": "human"}, "one environment"),
+        ({"threads": 0}, "threads"),
     ]:
         with pytest.raises(feeler.InputError, match=what):
             feeler.VectorInsertionEnv(2, **kwargs)
