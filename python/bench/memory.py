@@ -1,6 +1,6 @@
 """Whether resets and steps leave anything behind: growth of resident memory after a warm-up.
 
-    v/bin/python python/bench/memory.py [--resets 10000] [--steps 1000000] [--environments 200]
+v/bin/python python/bench/memory.py [--resets 10000] [--steps 1000000] [--environments 200]
 """
 
 from __future__ import annotations
