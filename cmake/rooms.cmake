@@ -98,7 +98,7 @@ function(feeler_tests room)  # the tests of `cli` run the binary
   target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")
   # A test is compiled more often than its own code runs long; what it tests is in the rooms, optimised in full.
-  target_compile_options(${room}_tests PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_compile_options(${room}_tests PRIVATE $<$<OR:$<CONFIG:Release>,$<CONFIG:RelWithDebInfo>>:-O1>)
   if(room STREQUAL cli)
     add_dependencies(cli_tests feeler)
   endif()

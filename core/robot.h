@@ -89,6 +89,14 @@ struct ContactResponse {
 
   /// What an obstacle has to stop.
   double mass_kg() const { return std::min(held_mass_kg, kOfFreeMass * free_mass_kg); }
+  /// The same where the tool is met along so much of its length that it cannot turn. More contact points are stiffer:
+  /// in proportion to the mass that they stop, as in the simulation.
+  ContactResponse Held() const {
+    ContactResponse held = *this;
+    held.stiffness_n_m *= held_mass_kg / mass_kg();
+    held.free_mass_kg = held_mass_kg;
+    return held;
+  }
 };
 
 /// The robot as the executor sees it: implemented by the simulation, or by a driver of a real arm. All poses are of the

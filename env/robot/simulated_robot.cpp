@@ -413,7 +413,8 @@ MotionResult SimulatedRobot::Transfer(const Pose& world_T_tool) {
     set_point_.reset();
     held_orientation_ = world_T_tool.linear();
     Watch watch;
-    watch.tool_force_n = options_.transfer_contact_force_n;
+    // Noise is no contact: what a guarded move needs to tell one from it, a transfer needs, too.
+    watch.tool_force_n = std::max(options_.transfer_contact_force_n, noise_.contact_threshold_n);
     watch.protective = true;
     const double path_before_m = statistics_.path_length_m;
     const auto reference_at = [&](double t) -> std::optional<JointReference> {

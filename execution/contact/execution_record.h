@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "feeler/core/direction.h"
 #include "feeler/core/pose.h"
 
 namespace feeler::execution {
@@ -64,6 +65,11 @@ struct ExecutionRecord {
   double peak_force_n = 0.0;
   double force_budget_n = 0.0;  ///< that it was carried out with; 0: none
   int budget_passings = 0;      ///< motions whose peak force lies above it
+  /// Greatest force met over the force that the robot's word predicts, per direction, at least 1: from the first
+  /// contact above the budget on, probes in that direction are slower by it.
+  std::array<double, kDirectionCount> force_excess = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+  /// A transfer met something where the policy knew of nothing: from then on transfers go as slowly as probes.
+  bool careful = false;
   std::vector<LadderRecord> ladder;
   double policy_cpu_s = 0.0;  ///< measured: belongs under `timing`
 };

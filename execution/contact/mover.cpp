@@ -97,15 +97,18 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
 
 MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted) {
   CheckLimits();
-  const MotionResult result =
-      robot_.LinearMove(frame_.ToWorld(target), options_.transfer_speed_m_s, options_.contact_force_n);
+  const Eigen::Vector3d way = target - position_;
+  double speed_m_s = options_.transfer_speed_m_s;
+  if (record_.careful && !way.isZero()) speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
+  const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
   const MotionReport report = Finish(result, target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
+  record_.careful = record_.careful || (report.contact && record_.moves.back().peak_force_n > options_.force_budget_n);
   return report;
 }
 
 MotionReport Mover::Probe(Direction direction, double coordinate, const std::string& kind,
-                          const PredictedCells& predicted) {
+                          const PredictedCells& predicted, bool held) {
   CheckLimits();
   const Eigen::Vector3d from = Measure(robot_.ToolPose());
   position_ = from;
@@ -115,10 +118,17 @@ MotionReport Mover::Probe(Direction direction, double coordinate, const std::str
   GuardedMotion motion;
   motion.direction = frame_.DirectionInWorld(direction);
   motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
-  motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedInto(UnitVector(direction)));
+  const ContactResponse told = robot_.Contact(motion.direction);
+  const ContactResponse contact = held ? told.Held() : told;
+  double& excess = record_.force_excess[static_cast<std::size_t>(direction)];
+  motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedWithinBudget(contact, options_.force_budget_n) / excess);
   motion.contact_force_n = options_.contact_force_n;
   const MotionReport report = Finish(robot_.Guarded(motion), target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
+  const double met_n = record_.moves.back().peak_force_n;
+  if (met_n > options_.force_budget_n) {
+    excess = std::max(excess, met_n / (motion.speed_m_s * ForcePerSpeed(contact)));
+  }
   return report;
 }
 
@@ -131,7 +141,9 @@ void Mover::Retreat(const Eigen::Vector3d& target) {
 
 double Mover::SpeedInto(const Eigen::Vector3d& direction) const {
   const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
-  return SpeedWithinBudget(robot_.Contact(in_world), options_.force_budget_n);
+  const auto nearest = DirectionOf(direction);
+  const double excess = nearest ? record_.force_excess[static_cast<std::size_t>(*nearest)] : 1.0;
+  return SpeedWithinBudget(robot_.Contact(in_world), options_.force_budget_n) / excess;
 }
 
 MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s, bool rests) {

@@ -54,8 +54,10 @@ class Mover {
 
   /// Fast and straight to `target`, watched for contact.
   MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {});
-  /// Slowly along an axis until its coordinate is `coordinate` or a contact comes.
-  MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted);
+  /// Slowly along an axis until its coordinate is `coordinate` or a contact comes. `held`: what may be met stops the
+  /// tool along so much of its length that it cannot turn.
+  MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted,
+                     bool held = false);
   /// Off a wall: contacts are expected to end, not watched for. Then takes the wrench as zero.
   void Retreat(const Eigen::Vector3d& target);
   /// Compliantly from here straight to `target`, at the speed of an insertion or `speed_m_s`, until the tool rests or,

@@ -20,6 +20,10 @@ constexpr double kSamePlace = 0.1;
 /// Shorter fast motions cost more than they save.
 constexpr double kShortestFast = 0.75;
 
+/// A wall that is met along more of the tool than this holds it: it cannot turn away. Up to here simulated contacts
+/// show no more than the mass of a tool that is met at its tip.
+constexpr double kHeld_m = 0.005;
+
 /// A chamfer is read up to this much deeper than the face around it, cells.
 constexpr double kRim = 0.6;
 
@@ -215,7 +219,18 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   }
   const double gone = sign * (mover_.position()[axis] - from);
   const PredictedCells left = std::array<double, 2>{(*predicted)[0] - gone, (*predicted)[1] - gone};
-  return MakeTouch(move.direction, from, mover_.Probe(move.direction, end, "probe", left));
+  return MakeTouch(move.direction, from,
+                   mover_.Probe(move.direction, end, "probe", left, MayHold(move.direction, move.cells + overtravel)));
+}
+
+bool Localizer::MayHold(Direction direction, double cells) const {
+  if (AxisOf(direction) == AxisOf(task_.insertion)) return false;  // met face to face: the robot counts with that
+  const Eigen::Vector3d station = Station();
+  const Eigen::Vector3d higher = station - mover_.Cells(kHeld_m) * UnitVector(task_.insertion);
+  return std::any_of(tracked_.begin(), tracked_.end(), [&](const TrackedHypothesis& t) {
+    const double travel = PredictTravel(*problem_.map, t, station, direction);
+    return travel <= cells && PredictTravel(*problem_.map, t, higher, direction) <= travel + kSamePlace;
+  });
 }
 
 bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells) {

@@ -134,9 +134,21 @@ void RemoteRobot::File(const std::string& line) {
       if (!of_stopped) RefuseMessageOf(fmt::format("reply {} where {} is due", framed.seq, seq_));
       framed.seq = seq_;
     }
+    TakeState(framed.body);
     reply_ = std::move(framed);
   }
   arrived_.notify_all();
+}
+
+void RemoteRobot::TakeState(const Reply& reply) {  // mutex_ is held
+  if (const auto* result = std::get_if<ResultReply>(&reply)) {
+    CheckState(result->state, true);
+    moving_ = false;
+  } else if (const auto* state = std::get_if<StateReply>(&reply)) {
+    CheckState(state->state, moving_);
+  } else if (const auto* episode = std::get_if<EpisodeReply>(&reply)) {
+    state_ = episode->state;  // a new world: neither clock nor pose follow from the last
+  }
 }
 
 void RemoteRobot::RefuseMessageOf(const std::string& what) {
@@ -245,17 +257,7 @@ Reply RemoteRobot::Exchange(const Request& request) {
 }
 
 void RemoteRobot::RequireState(const Reply& reply) {
-  const auto* state = std::get_if<StateReply>(&reply);
-  if (state == nullptr) {
-    Lose("answers with something else than its state");
-    return;
-  }
-  try {
-    const std::lock_guard lock(mutex_);
-    CheckState(state->state, false);
-  } catch (const InputError& error) {
-    Lose(error.what());
-  }
+  if (!std::holds_alternative<StateReply>(reply)) Lose("answers with something else than its state");
 }
 
 void RemoteRobot::ZeroWrench() {
@@ -275,8 +277,6 @@ EpisodeReply RemoteRobot::BeginEpisode(std::optional<std::uint64_t> episode) {
   const Reply reply = Exchange(EpisodeRequest{episode});
   const auto* told = std::get_if<EpisodeReply>(&reply);
   if (told == nullptr) throw WorldError("robot", "answers an episode with something else", "see its program");
-  const std::lock_guard lock(mutex_);
-  state_ = told->state;  // a new world: neither clock nor pose follow from the last
   return *told;
 }
 
@@ -329,11 +329,6 @@ MotionResult RemoteRobot::Move(const Request& request, double longest_m) {
   }
   const double settled_m = (ended->state.world_T_tool.translation() - ended->result.world_T_tool.translation()).norm();
   if (settled_m > kJump_m) return lost_here("the reported pose jumps at the end of a motion");
-  try {
-    CheckState(ended->state, true);
-  } catch (const InputError& error) {
-    return lost_here(error.what());
-  }
   return ended->result;
 }
 

@@ -78,6 +78,8 @@ class RemoteRobot final : public Robot {
   /// Reads one line and files it. False if there was none in time.
   bool TakeLine(double timeout_s);
   void File(const std::string& line);
+  /// Takes the state that a reply carries as the reply comes in: heartbeats that follow are later.
+  void TakeState(const Reply& reply);
   void CheckState(const RobotState& state, bool may_move);
   void Lose(const std::string& reason);
   [[noreturn]] static void RefuseMessageOf(const std::string& what);

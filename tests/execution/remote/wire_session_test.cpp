@@ -273,26 +273,116 @@ TEST(WireFaults, NamesAndNumbersAreChecked) {
   }
 }
 
+/// Frames that a fuzz test sends: FEELER_WIRE_FRAMES, or few.
+int Frames() {
+  const char* wanted = std::getenv("FEELER_WIRE_FRAMES");
+  return wanted != nullptr ? std::max(1, std::atoi(wanted)) : 1200;
+}
+
+/// Changes, drops, doubles or adds a few bytes.
+std::string Mutated(std::string line, std::mt19937& random) {
+  for (unsigned n = 1 + random() % 3; n > 0 && !line.empty(); --n) {
+    const std::size_t at = random() % line.size();
+    switch (random() % 4) {
+      case 0: line[at] = static_cast<char>(random() % 256); break;
+      case 1: line.erase(at, 1 + random() % 8); break;
+      case 2: line.insert(at, line.substr(at, 1 + random() % 8)); break;
+      default: line[at] = "0123456789-eE+.,\"{}[]"[random() % 21]; break;
+    }
+  }
+  return line;
+}
+
 TEST(WireFuzz, NoFrameMovesARobot) {
   const std::vector<std::string> seeds = {
       Hello(),  Line(1, StartRequest{}),    Line(1, Down()),           Line(2, Down()), "(1,0,1,0)",
       "(11,1)", "(7,1,0,0,-1,0.01,0.05,5)", "(7,2,0,0,-1,0.01,0.05,5)"};
   Cell cell;
   std::mt19937 random(5);
-  constexpr int kSessions = 60;
-  for (int session = 0; session < kSessions; ++session) {
+  constexpr int kFramesASession = 20;
+  for (int session = 0; session < Frames() / kFramesASession; ++session) {
     Connection connection = cell.Dial();
     if (session % 2 == 0) connection.Write(Hello() + "\n");
     // Starts are left out: without one every motion is refused, however sound the frame.
-    for (int i = 0; i < 20; ++i) {
+    for (int i = 0; i < kFramesASession; ++i) {
       std::string line = seeds[random() % seeds.size()];
       if (line.find("start") != std::string::npos || line == "(11,1)") continue;
-      if (random() % 3 == 0 && !line.empty()) line[random() % line.size()] = static_cast<char>(random() % 256);
+      if (random() % 3 == 0) line = Mutated(line, random);
       connection.Write(line + (random() % 10 == 0 ? "" : "\n"));
     }
   }
   cell.Stop();
   EXPECT_EQ(cell.robot.moved_steps, 0);
+}
+
+/// The robot's side of a session that says nonsense now and then. Returns how many frames it said; `after`: requests
+/// that came after it had said what is no sound reply.
+int TalkNonsense(Connection connection, std::mt19937& random, int& after) {
+  std::string line;
+  if (connection.ReadLine(line, 5.0) != LineStatus::kLine) return 0;
+  WelcomeReply welcome;
+  welcome.lockstep = true;
+  welcome.simulated = true;
+  welcome.capabilities.motions = {"transfer", "linear", "guarded", "compliant"};
+  int said = 0;
+  bool unsound = false;
+  const auto say = [&](std::uint64_t seq, const Reply& reply) {
+    std::string text = EncodeReply(WireForm::kJson, seq, reply);
+    if (random() % 4 == 0) text = Mutated(text, random);
+    try {
+      DecodeReply(WireForm::kJson, text);
+    } catch (const InputError&) {
+      unsound = true;
+    }
+    connection.Write(text + "\n");
+    ++said;
+  };
+  say(0, welcome);
+  while (connection.ReadLine(line, 5.0) == LineStatus::kLine) {
+    if (unsound) ++after;
+    const Framed<Request> request = DecodeRequest(WireForm::kJson, line);
+    if (random() % 4 == 0) say(0, StateReply{});
+    if (IsMotion(request.body)) {
+      say(request.seq, ResultReply{});
+    } else {
+      say(request.seq, StateReply{});
+    }
+  }
+  return said;
+}
+
+TEST(WireFuzz, AnExecutorThatHeardNonsenseAsksForNoMotion) {
+  Listener listener("--listen", {"127.0.0.1", 0});
+  const int wanted = Frames();
+  std::atomic<int> said{0};
+  int after = 0;
+  std::jthread robot([&] {
+    std::mt19937 random(11);
+    while (said < wanted) {
+      if (auto connection = listener.Accept(0.02)) said += TalkNonsense(std::move(*connection), random, after);
+    }
+  });
+  int sessions = 0;
+  int lost = 0;
+  while (said < wanted) {
+    ++sessions;
+    try {
+      RemoteRobot remote(Connect({"127.0.0.1", listener.port()}, 5.0), {});
+      remote.Start();
+      for (int i = 0; i < 40 && remote.lost().empty(); ++i) {
+        remote.Guarded(Down(0.0));
+        if (i % 3 == 0) remote.ZeroWrench();
+      }
+      if (!remote.lost().empty()) ++lost;
+    } catch (const InputError&) {
+      ++lost;
+    } catch (const WorldError&) {
+      ++lost;
+    }
+  }
+  robot.join();
+  EXPECT_EQ(after, 0);
+  EXPECT_GT(lost, sessions / 2) << "the nonsense is heard";
 }
 
 TEST(WireChecks, AMotionOutsideOfTheLimitsIsNotSent) {

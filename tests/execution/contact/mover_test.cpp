@@ -1,0 +1,120 @@
+// Laws of a mover under a force budget, against a wall that pushes back in proportion to speed, harder than the robot
+// says:
+//   - the first probe into it may pass the budget; no later one in its direction does, and other directions stay as
+//   fast;
+//   - a probe into what holds the tool is slower by the masses;
+//   - after a transfer that met something above the budget, transfers keep within it; before, they go at full speed.
+#include "feeler/execution/contact/mover.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "feeler/execution/contact/force_budget.h"
+
+namespace feeler::execution {
+namespace {
+
+/// A tool that meets something at the end of every motion.
+class HardRobot final : public Robot {
+ public:
+  explicit HardRobot(double harder) : harder_(harder) {
+    contact_.held_mass_kg = 12.0;
+    contact_.free_mass_kg = 3.0;
+    contact_.stiffness_n_m = 2e4;
+  }
+  Pose ToolPose() const override { return pose_; }
+  Wrench ContactWrench() const override { return {}; }
+  void ZeroWrench() override {}
+  double Time() const override { return time_s_; }
+  ContactResponse Contact(const Eigen::Vector3d& /*direction*/) const override { return contact_; }
+  MotionResult Transfer(const Pose& goal) override { return Meet(goal, 0.25); }
+  MotionResult LinearMove(const Pose& goal, double speed_m_s, double /*force*/) override {
+    return Meet(goal, speed_m_s);
+  }
+  MotionResult Guarded(const GuardedMotion& motion) override {
+    Pose goal = pose_;
+    goal.translation() += motion.distance_m * motion.direction;
+    return Meet(goal, motion.speed_m_s);
+  }
+  MotionResult Compliant(const CompliantMotion& motion) override {
+    return Meet(motion.world_T_tool.back(), motion.speed_m_s);
+  }
+
+  std::vector<double> speeds_m_s;
+
+ private:
+  MotionResult Meet(const Pose& goal, double speed_m_s) {
+    speeds_m_s.push_back(speed_m_s);
+    pose_ = goal;
+    time_s_ += 0.1;
+    MotionResult result;
+    result.reason = StopReason::kContact;
+    result.contact = true;
+    result.peak_force_n = harder_ * speed_m_s * ForcePerSpeed(contact_);
+    result.world_T_tool = pose_;
+    return result;
+  }
+
+  double harder_;
+  ContactResponse contact_;
+  Pose pose_ = Pose::Identity();
+  double time_s_ = 0.0;
+};
+
+struct Bench {
+  explicit Bench(double harder) : robot(harder) {
+    options.force_budget_n = 20.0;
+    options.probe_speed_m_s = 1.0;
+  }
+  double Probe(Direction direction, bool held = false) {
+    Mover mover(robot, frame, options, record, 0.0);  // movers come and go within an episode
+    mover.Probe(direction, mover.position()[AxisOf(direction)] + SignOf(direction) * 2.0, "probe", {}, held);
+    return record.moves.back().peak_force_n;
+  }
+  HardRobot robot;
+  LatticeFrame frame;
+  ExecutorOptions options;
+  ExecutionRecord record;
+};
+
+TEST(Mover, AContactThatIsHarderThanToldIsNotMetTwice) {
+  for (const double harder : {1.3, 2.0, 5.0}) {
+    Bench bench(harder);
+    EXPECT_GT(bench.Probe(Direction::kPlusY), 20.0);
+    const double first_m_s = bench.robot.speeds_m_s.back();
+    for (int i = 0; i < 3; ++i) EXPECT_LE(bench.Probe(Direction::kPlusY), 20.0) << harder;
+    bench.Probe(Direction::kMinusX);
+    EXPECT_DOUBLE_EQ(bench.robot.speeds_m_s.back(), first_m_s) << "nothing was learned of this direction";
+    EXPECT_EQ(bench.record.budget_passings, 2);
+  }
+}
+
+TEST(Mover, AContactAsToldChangesNothing) {
+  Bench bench(1.0);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(bench.Probe(Direction::kMinusZ), kShareOfBudget * 20.0, 1e-9);
+}
+
+TEST(Mover, WhatHoldsTheToolIsMetSlower) {
+  Bench bench(1.0);
+  bench.Probe(Direction::kPlusX);
+  const double free_m_s = bench.robot.speeds_m_s.back();
+  bench.Probe(Direction::kPlusX, true);
+  const ContactResponse told = bench.robot.Contact(Eigen::Vector3d::UnitX());
+  EXPECT_NEAR(free_m_s / bench.robot.speeds_m_s.back(), told.held_mass_kg / told.mass_kg(), 1e-9);
+}
+
+TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {
+  Bench bench(1.0);
+  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  mover.Fast({4.0, 0.0, 0.0}, "transfer");
+  EXPECT_DOUBLE_EQ(bench.robot.speeds_m_s.back(), bench.options.transfer_speed_m_s);
+  EXPECT_GT(bench.record.moves.back().peak_force_n, 20.0);
+  for (int i = 1; i < 4; ++i) {
+    mover.Fast({4.0, 3.0 * i, 0.0}, "transfer");
+    EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
+  }
+}
+
+}  // namespace
+}  // namespace feeler::execution
