@@ -28,6 +28,8 @@ struct Flags {
   std::string pomdps;
   std::uint64_t seed = 1;
   int solver_seeds = 0;
+  std::string shard;
+  std::vector<std::string> from;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
@@ -65,6 +67,8 @@ void Run(const Flags& flags, Session& session) {
   request.seed = flags.seed;
   request.task = flags.task;
   request.pomdps = flags.pomdps;
+  request.shard = ShardOf(flags.shard);
+  request.from = flags.from;
   request.solver_seeds = flags.solver_seeds;
   request.command = fmt::format("feeler experiment {} --out {}{}{}{}{} --seed {} --jobs {}", flags.name, flags.out,
                                 flags.quick ? " --quick" : "", flags.task.empty() ? "" : " --task " + flags.task,
@@ -79,6 +83,11 @@ void Run(const Flags& flags, Session& session) {
   map_bar.Finish();
   database_bar.Finish();
   bar.Finish();
+  if (request.shard && !session.cancellation->cancelled()) {
+    Note("shard {} of {} is measured: give all their folders to feeler experiment {} --from\n", request.shard->index,
+         request.shard->count, flags.name);
+    return;
+  }
   if (!outcome.complete) {
     Note("interrupted: what is done is kept in {}; run the same command again to go on\n", outcome.partial_file);
     session.exit_code = 1;
@@ -108,6 +117,8 @@ void AddExperimentCommand(CLI::App& app, Session& session) {
              "repetitions of each attempt of a table (default: 3; 1 with --quick); more may be added to a "
              "finished folder",
              false);
+  AddShard(*command, flags->shard, "the cells and episodes, into a folder of its own");
+  command->add_option("--from", flags->from, "folders of shards, to go on from what they measured");
   AddSeed(*command, flags->seed, "of the sample and the first of the solver seeds");
   AddJobs(*command, flags->jobs, "threads; more than the cores would spoil the measured times");
   command->callback([flags, &session] { Run(*flags, session); });

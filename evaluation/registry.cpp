@@ -22,12 +22,10 @@
 
 namespace feeler::evaluation {
 
-std::string PartialFile(const ExperimentRequest& request, const std::string& name) {
-  return request.out + "/" + name + ".partial.jsonl";
-}
+namespace {
 
-const std::vector<Experiment>& Experiments() {
-  static const std::vector<Experiment> kExperiments = {
+std::vector<Experiment> AllExperiments() {
+  return {
       {kAcceptanceClosedLoopName, "episodes in physics at full size, with and without fallbacks, under every noise",
        RunAcceptanceClosedLoop},
       {kAcceptanceContactMapsName, "contact maps over orientation: time of the build, agreement with MuJoCo",
@@ -58,6 +56,32 @@ const std::vector<Experiment>& Experiments() {
       {kVisualServoingName, "visual servoing in four scenes, by SIFT features and by the corners of red tape",
        RunVisualServoing},
   };
+}
+
+}  // namespace
+
+std::string PartialFile(const ExperimentRequest& request, const std::string& name) {
+  return request.out + "/" + name + ".partial.jsonl";
+}
+
+std::vector<std::string> PartialFilesOf(const ExperimentRequest& request, const std::string& name) {
+  std::vector<std::string> files;
+  for (const std::string& folder : request.from) files.push_back(folder + "/" + name + ".partial.jsonl");
+  return files;
+}
+
+const std::vector<Experiment>& Experiments() {
+  static const std::vector<Experiment> kExperiments = [] {
+    std::vector<Experiment> all = AllExperiments();
+    for (Experiment& experiment : all) {
+      // Those whose cells and records are measured one by one; the others are minutes in all.
+      for (const auto* name : {kAcceptanceClosedLoopName, kBaselinesName, kFigureTblName, kNoiseName, kSpiralTuningName,
+                               kTable1PlugName, kTable2FrameworkName, kTable3AblationName, kTable4PipeName}) {
+        if (experiment.name == name) experiment.takes_shard = true;
+      }
+    }
+    return all;
+  }();
   return kExperiments;
 }
 
@@ -84,6 +108,9 @@ ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRe
   if (request.solver_seeds < 0 || (request.solver_seeds > 0 && !experiment.takes_solver_seeds)) {
     throw InputError("--solver-seeds", request.solver_seeds < 0 ? "negative" : "not used by " + experiment.name,
                      "leave it out");
+  }
+  if ((request.shard || !request.from.empty()) && !experiment.takes_shard) {
+    throw InputError("--shard", "experiment " + experiment.name + " is measured in one go", "leave it out, and --from");
   }
   std::error_code error;
   std::filesystem::create_directories(request.out, error);

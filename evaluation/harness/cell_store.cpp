@@ -15,7 +15,11 @@ using nlohmann::json;
 CellStore::CellStore(std::string path, const json& settings) : path_(std::move(path)) {
   std::error_code error;
   const bool fresh = !std::filesystem::exists(path_, error) || std::filesystem::file_size(path_, error) == 0;
-  if (!fresh) Read(settings);
+  if (!fresh) {
+    const std::size_t whole = Read(path_, settings, cells_);
+    if (whole < std::filesystem::file_size(path_, error)) std::filesystem::resize_file(path_, whole, error);
+    if (error) throw InputError(path_, "cannot be written: " + error.message(), "check its permissions");
+  }
   file_ = std::fopen(path_.c_str(), "ab");
   if (file_ == nullptr) throw InputError(path_, "cannot be written", "choose another folder");
   if (fresh || std::filesystem::file_size(path_, error) == 0) WriteLine({{"settings", settings}});
@@ -25,13 +29,13 @@ CellStore::~CellStore() {
   if (file_ != nullptr) std::fclose(file_);
 }
 
-void CellStore::Read(const json& settings) {
+std::size_t CellStore::Read(const std::string& path, const json& settings, Cells& cells) {
   const std::string other = "choose another folder, or move this file away";
   std::string text;
   {
-    std::ifstream in(path_, std::ios::binary);
+    std::ifstream in(path, std::ios::binary);
     text.assign(std::istreambuf_iterator<char>(in), {});
-    if (!in && !in.eof()) throw InputError(path_, "cannot be read", other);
+    if (!in.is_open() || (!in && !in.eof())) throw InputError(path, "cannot be read", other);
   }
   std::size_t begin = 0;
   int number = 0;
@@ -45,16 +49,30 @@ void CellStore::Read(const json& settings) {
     const bool valid =
         line.is_object() && (header ? line.contains("settings")
                                     : line.contains("cell") && line["cell"].is_string() && line.contains("value"));
-    if (!valid) throw InputError(path_, "line " + std::to_string(number) + " is damaged", other);
+    if (!valid) throw InputError(path, "line " + std::to_string(number) + " is damaged", other);
     if (header && line["settings"] != settings) {
-      throw InputError(path_, "holds the cells of a run with other settings (" + line["settings"].dump() + ")", other);
+      throw InputError(path, "holds the cells of a run with other settings (" + line["settings"].dump() + ")", other);
     }
-    if (!header) cells_.insert_or_assign(line["cell"].get<std::string>(), line["value"]);
+    if (!header) cells.insert_or_assign(line["cell"].get<std::string>(), line["value"]);
     begin = end + 1;
   }
-  std::error_code error;
-  if (begin < text.size()) std::filesystem::resize_file(path_, begin, error);
-  if (error) throw InputError(path_, "cannot be written: " + error.message(), "check its permissions");
+  return begin;
+}
+
+void CellStore::Adopt(const std::vector<std::string>& paths, const json& settings) {
+  std::map<std::string, std::string> holders;
+  for (const std::string& path : paths) {
+    Cells cells;
+    Read(path, settings, cells);
+    for (auto& [cell, value] : cells) {
+      const auto [other, is_new] = holders.emplace(cell, path);
+      if (!is_new) {
+        throw InputError(path, "holds the cell \"" + cell + "\", as " + other->second + " does",
+                         "give each shard once");
+      }
+      if (Find(cell) == nullptr) Put(cell, std::move(value));
+    }
+  }
 }
 
 const json* CellStore::Find(const std::string& cell) const {

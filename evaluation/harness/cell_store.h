@@ -5,6 +5,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace feeler::evaluation {
 
@@ -18,6 +19,9 @@ class CellStore {
   /// Opens or creates `path`. A cut-off last line is dropped. Throws InputError if the file was made under other
   /// settings, is damaged, or cannot be written.
   CellStore(std::string path, const nlohmann::json& settings);
+  /// Takes over the finished cells of other stores, those of shards. Throws InputError if one cannot be read, was made
+  /// under other settings, or holds a cell that another of them holds too.
+  void Adopt(const std::vector<std::string>& paths, const nlohmann::json& settings);
   ~CellStore();
   CellStore(const CellStore&) = delete;
   CellStore& operator=(const CellStore&) = delete;
@@ -29,12 +33,14 @@ class CellStore {
   void Put(const std::string& cell, nlohmann::json value);
 
  private:
-  void Read(const nlohmann::json& settings);
+  using Cells = std::map<std::string, nlohmann::json>;
+  /// Returns how many bytes of the file are whole lines.
+  static std::size_t Read(const std::string& path, const nlohmann::json& settings, Cells& cells);
   void WriteLine(const nlohmann::json& line);
 
   std::string path_;
   mutable std::mutex mutex_;
-  std::map<std::string, nlohmann::json> cells_;
+  Cells cells_;
   std::FILE* file_ = nullptr;
 };
 

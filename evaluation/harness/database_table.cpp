@@ -302,12 +302,16 @@ ExperimentResult RunDatabaseTable(const PlanningCase& planning_case, DatabaseTab
                      {"rows", row_settings}};
 
   CellStore cells(PartialFile(request, table.name), result.settings);  // more seeds may be added to finished ones
+  cells.Adopt(PartialFilesOf(request, table.name), result.settings);
   result.settings["seeds"] = result.seeds;
   SweepContext context{&cells, request.jobs, request.cancellation, request.progress};
+  context.shard = request.shard;
   SolverSweep sweep(planning_case, sample, rows, result.seeds, context);
   context.keep_policies = false;
   SolverSweep family_sweep(planning_case, whole, family_rows, {request.seed}, context);
-  if (!family_sweep.Run() || !sweep.Run()) return result;
+  const bool has_family = family_sweep.Run();
+  if (!has_family && !request.shard) return result;
+  if (!sweep.Run() || !has_family) return result;
 
   std::vector<Section> sections = {{"sample", &table.rows, table.base, table.reference, {}}};
   for (std::size_t i = 0; i < rows.size(); ++i) sections[0].measured.push_back(Measure(sweep, sections[0], i));

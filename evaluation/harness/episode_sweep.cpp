@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <set>
 #include <system_error>
@@ -29,7 +30,9 @@ using nlohmann::json;
 constexpr double kGap = 1.2;
 
 /// The records that a file holds, without a last line that was cut off while it was written.
-std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& setting, std::uint64_t seed) {
+/// `numbers`: the episodes that it holds, one after the other.
+std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& setting, std::uint64_t seed,
+                               const std::vector<std::int64_t>& numbers) {
   std::vector<json> records;
   std::ifstream in(path, std::ios::binary);
   if (!in) return records;
@@ -42,7 +45,9 @@ std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& se
     const std::string_view bytes = std::string_view(text).substr(begin, end - begin);
     json record = IsNestedDeeper(bytes) ? json() : json::parse(bytes, nullptr, false);
     const auto is = [&](const char* key, const json& value) { return record.contains(key) && record[key] == value; };
-    if (!record.is_object() || !is("episode", records.size()) || !is("seed", seed) || !is("noise", noise)) {
+    const bool expected = records.size() < numbers.size();
+    if (!record.is_object() || !expected || !is("episode", numbers[records.size()]) || !is("seed", seed) ||
+        !is("noise", noise)) {
       throw InputError(path + " line " + std::to_string(records.size() + 1), "is not the record expected there",
                        "choose another folder, or move this one away");
     }
@@ -52,6 +57,31 @@ std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& se
   std::error_code error;
   if (begin < text.size()) std::filesystem::resize_file(path, begin, error);
   if (error) throw InputError(path, "cannot be written: " + error.message(), "check its permissions");
+  return records;
+}
+
+/// The records of shards, by episode.
+std::map<std::int64_t, json> ReadShards(const std::vector<std::string>& files, const EpisodeSetting& setting,
+                                        std::uint64_t seed) {
+  std::map<std::int64_t, json> records;
+  for (const std::string& file : files) {
+    std::ifstream in(file, std::ios::binary);
+    int number = 0;
+    for (std::string line; std::getline(in, line) && !in.eof();) {  // a last line that is cut off is none
+      ++number;
+      json record = IsNestedDeeper(line) ? json() : json::parse(line, nullptr, false);
+      const bool good = record.is_object() && record.value("seed", json()) == json(seed) &&
+                        record.value("noise", json()) == json(workflow::ParseFaults(setting.noise).name) &&
+                        record.value("episode", json()).is_number_integer();
+      const auto where = file + " line " + std::to_string(number);
+      if (!good) throw InputError(where, "is no record of this setting", "give folders of shards of this experiment");
+      const auto episode = record["episode"].get<std::int64_t>();
+      if (!records.emplace(episode, std::move(record)).second) {
+        throw InputError(where, "holds episode " + std::to_string(episode) + ", as another shard does",
+                         "give each shard once");
+      }
+    }
+  }
   return records;
 }
 
@@ -136,6 +166,10 @@ EpisodeSweep::EpisodeSweep(std::string experiment, std::vector<EpisodeSetting> s
                            const ExperimentRequest& request)
     : experiment_(std::move(experiment)), settings_(std::move(settings)), request_(request) {}
 
+std::vector<std::int64_t> EpisodeSweep::Numbers(const EpisodeSetting& setting) const {
+  return workflow::NumbersOfShard(0, setting.episodes, request_.shard);
+}
+
 std::string EpisodeSweep::RecordsFile(const EpisodeSetting& setting) const {
   return request_.out + "/" + experiment_ + "/" + FileName(setting.name);
 }
@@ -150,7 +184,7 @@ bool EpisodeSweep::Run() {
   std::int64_t total = 0;
   std::vector<std::pair<std::string, std::string>> groups;  // task and cost: one database each
   for (const EpisodeSetting& setting : settings_) {
-    total += setting.episodes;
+    total += static_cast<std::int64_t>(Numbers(setting).size());
     workflow::ParseFaults(setting.noise);
     workflow::UsesLadder(setting.policy);  // an unknown policy fails before the first episode
     workflow::ParsePolicyOptions(setting.policy_options);
@@ -163,12 +197,13 @@ bool EpisodeSweep::Run() {
     if (error) throw InputError(folder, "cannot be created: " + error.message(), "choose another folder");
   }
   // Refuses a folder that was begun under other settings.
-  const CellStore store(PartialFile(request_, experiment_), SettingsJson());
+  CellStore store(PartialFile(request_, experiment_), SettingsJson());
+  store.Adopt(PartialFilesOf(request_, experiment_), SettingsJson());
   std::int64_t done = 0;
   for (const auto& [task, cost] : groups) {
     if (!RunGroup(task, cost, done, total)) return false;
   }
-  return true;
+  return !request_.shard;
 }
 
 struct EpisodeSweep::TaskWorld {
@@ -214,7 +249,7 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
   for (const EpisodeSetting& setting : settings_) {
     if (setting.task != task || setting.cost != cost) continue;
     if (!RunSetting(world, setting, done, total)) return false;
-    done += setting.episodes;
+    done += static_cast<std::int64_t>(Numbers(setting).size());
   }
   return true;
 }
@@ -222,7 +257,12 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
 bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& setting, std::int64_t done,
                               std::int64_t total) {
   const std::string file = RecordsFile(setting);
-  const auto first = static_cast<std::int64_t>(ReadFinished(file, setting, request_.seed).size());
+  const std::vector<std::int64_t> numbers = Numbers(setting);
+  std::size_t written = ReadFinished(file, setting, request_.seed, numbers).size();
+  std::vector<std::string> files;
+  for (const std::string& folder : request_.from)
+    files.push_back(folder + "/" + experiment_ + "/" + FileName(setting.name));
+  const std::map<std::int64_t, json> of_shards = ReadShards(files, setting, request_.seed);
   std::ofstream out(file, std::ios::app);
   WriteSceneFile(*world.scene, request_.out + "/" + experiment_);
   const auto require_written = [&] {
@@ -234,19 +274,19 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
   for (const EpisodeSetting& other : settings_) {
     if (!setting.bare_of.empty() && other.name == setting.bare_of) with_ladder = Records(other);
   }
+  /// The record of the i-th number, where it need not be run.
+  const auto known = [&](std::size_t i) -> const json* {
+    const auto shard = of_shards.find(numbers[i]);
+    if (shard != of_shards.end()) return &shard->second;
+    return i < with_ladder.size() && with_ladder[i].at("ladder").empty() ? &with_ladder[i] : nullptr;
+  };
   // Writes what can be taken over up to the next episode that has to be run.
-  std::int64_t written = first;
   const auto take_over = [&] {
-    for (; written < setting.episodes && written < static_cast<std::int64_t>(with_ladder.size()); ++written) {
-      const json& record = with_ladder[static_cast<std::size_t>(written)];
-      if (!record.at("ladder").empty()) return;
-      out << record.dump() << "\n";
-    }
+    for (; written < numbers.size() && known(written) != nullptr; ++written) out << known(written)->dump() << "\n";
   };
   std::vector<std::int64_t> episodes;
-  for (const std::int64_t episode : workflow::EpisodeRange(first, setting.episodes)) {
-    const auto index = static_cast<std::size_t>(episode);
-    if (index >= with_ladder.size() || !with_ladder[index].at("ladder").empty()) episodes.push_back(episode);
+  for (std::size_t i = written; i < numbers.size(); ++i) {
+    if (known(i) == nullptr) episodes.push_back(numbers[i]);
   }
 
   workflow::EpisodeOptions options;
@@ -267,7 +307,7 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
         ++written;
         take_over();
         out.flush();
-        if (request_.progress) request_.progress(done + written, total);
+        if (request_.progress) request_.progress(done + static_cast<std::int64_t>(written), total);
       },
       {}, request_.cancellation);
   out.flush();
@@ -276,7 +316,7 @@ bool EpisodeSweep::RunSetting(const TaskWorld& world, const EpisodeSetting& sett
 }
 
 std::vector<json> EpisodeSweep::Records(const EpisodeSetting& setting) const {
-  return ReadFinished(RecordsFile(setting), setting, request_.seed);
+  return ReadFinished(RecordsFile(setting), setting, request_.seed, Numbers(setting));
 }
 
 }  // namespace feeler::evaluation

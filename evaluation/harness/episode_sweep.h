@@ -68,7 +68,8 @@ class EpisodeSweep {
   /// `experiment` names the folder of the records. Episode k has the same draws under every setting.
   EpisodeSweep(std::string experiment, std::vector<EpisodeSetting> settings, const ExperimentRequest& request);
 
-  /// False if it was cancelled. Throws InputError for an unknown task, policy or noise before the first episode runs.
+  /// False if it was cancelled, or did only a shard. Throws InputError for an unknown task, policy or noise before the
+  /// first episode runs.
   bool Run();
 
   const std::vector<EpisodeSetting>& settings() const { return settings_; }
@@ -78,6 +79,8 @@ class EpisodeSweep {
   nlohmann::json SettingsJson() const;
 
  private:
+  /// The episodes of a setting: all, or those of the shard.
+  std::vector<std::int64_t> Numbers(const EpisodeSetting& setting) const;
   std::string RecordsFile(const EpisodeSetting& setting) const;
   struct TaskWorld;
   /// The problems that the episodes of the settings of a task and a cost draw: what their database has to hold.

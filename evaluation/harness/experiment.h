@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
 #include "feeler/evaluation/harness/experiment_output.h"
+#include "feeler/workflow/scale/shard.h"
 
 namespace feeler::evaluation {
 
@@ -21,6 +23,8 @@ struct ExperimentRequest {
   std::string pomdps;                               ///< folder of further models, where it takes them
   std::uint64_t seed = 1;                           ///< of samples; solver seeds count up from it
   int solver_seeds = 0;                             ///< repetitions, where the experiment takes them; 0: its own number
+  std::optional<workflow::Shard> shard;             ///< measure only this part: never complete
+  std::vector<std::string> from;                    ///< folders of shards, whose cells and records are taken over
   std::string command;                              ///< for the manifest
   const CancellationToken* cancellation = nullptr;  ///< may be null
   ProgressCallback map_progress;                    ///< while a contact map is built
@@ -47,9 +51,12 @@ struct Experiment {
   bool takes_task = false;          ///< follows ExperimentRequest::task
   bool takes_solver_seeds = false;  ///< follows ExperimentRequest::solver_seeds
   bool takes_pomdps = false;        ///< follows ExperimentRequest::pomdps
+  bool takes_shard = false;         ///< follows ExperimentRequest::shard and from
 };
 
 /// Where the finished cells of an experiment are kept: OUT/NAME.partial.jsonl.
 std::string PartialFile(const ExperimentRequest& request, const std::string& name);
+/// Those of the shards.
+std::vector<std::string> PartialFilesOf(const ExperimentRequest& request, const std::string& name);
 
 }  // namespace feeler::evaluation

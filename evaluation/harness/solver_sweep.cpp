@@ -160,13 +160,15 @@ std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const plan
 }
 
 bool SolverSweep::Run() {
-  const auto total = static_cast<std::int64_t>(sample_.problems.size() * rows_.size() * seeds_.size());
   std::int64_t before = 0;
+  const std::vector<planner::Extents> own =
+      context_.shard ? workflow::ProblemsOfShard(sample_, *context_.shard) : sample_.problems;
+  const auto total = static_cast<std::int64_t>(own.size() * rows_.size() * seeds_.size());
   // The last rows first: the base, which is the slowest, has the rest beside it if it is interrupted.
   for (const SolverRow& row : std::ranges::reverse_view(rows_)) {
     for (const std::uint64_t seed : seeds_) {
       Sink sink(*this, row, seed);
-      const bool finished = std::all_of(sample_.problems.begin(), sample_.problems.end(),
+      const bool finished = std::all_of(own.begin(), own.end(),
                                         [&](const planner::Extents& extents) { return sink.Find(extents) != nullptr; });
       if (!finished) {
         planner::PreprocessOptions options;
@@ -176,6 +178,7 @@ bool SolverSweep::Run() {
         options.order = row.order;
         options.experience = row.experience;
         options.jobs = context_.jobs;
+        if (context_.shard) options.only = std::make_shared<const std::vector<planner::Extents>>(own);
         options.tables = TablesFor(row.options);
         options.cancellation = context_.cancellation;
         options.progress = [&](std::int64_t done, std::int64_t) {
@@ -183,11 +186,11 @@ bool SolverSweep::Run() {
         };
         if (planner::Preprocess(case_.task, case_.map, sample_, options, sink).cancelled) return false;
       }
-      before += static_cast<std::int64_t>(sample_.problems.size());
+      before += static_cast<std::int64_t>(own.size());
       if (context_.progress) context_.progress(before, total);
     }
   }
-  return true;
+  return !context_.shard;
 }
 
 std::vector<SolveRecord> SolverSweep::Records(std::size_t row) const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "feeler/evaluation/harness/cell_store.h"
 #include "feeler/evaluation/harness/comparison.h"
 #include "feeler/planner/family/preprocess.h"
+#include "feeler/workflow/scale/shard.h"
 
 namespace feeler::evaluation {
 
@@ -46,6 +48,7 @@ struct SweepContext {
   /// Keep policies that may serve as experience with the cells. Without, a row of E-RTDP-Bel that was interrupted is
   /// run again from its first problem: right for whole families, whose policies would fill gigabytes.
   bool keep_policies = true;
+  std::optional<workflow::Shard> shard = std::nullopt;  ///< run only these problems of each row
 };
 
 /// Runs rows over a sample, seed by seed, by Algorithm 3 (planner::Preprocess): E-RTDP-Bel takes the most similar
@@ -55,7 +58,7 @@ class SolverSweep {
   SolverSweep(PlanningCase planning_case, planner::ProblemFamily sample, std::vector<SolverRow> rows,
               std::vector<std::uint64_t> seeds, SweepContext context);
 
-  /// False if it was cancelled.
+  /// False if it was cancelled, or did only a shard.
   bool Run();
 
   const planner::ProblemFamily& sample() const { return sample_; }

@@ -141,6 +141,7 @@ std::vector<Cell> CellsOf(const Protocol& protocol) {
 bool MeasureAll(const World& world, const std::vector<Cell>& cells, const ExperimentRequest& request,
                 CellStore& store) {
   const auto measure = [&](std::size_t i) {
+    if (request.shard && static_cast<int>(i) % request.shard->count != request.shard->index - 1) return;
     if (store.Find(cells[i].Key()) == nullptr) store.Put(cells[i].Key(), Measure(world, cells[i]));
   };
   return ParallelFor(cells.size(), request.jobs, measure, request.progress, request.cancellation);
@@ -189,7 +190,8 @@ ExperimentResult RunFigureTbl(const ExperimentRequest& request) {
                      {"seed", request.seed}};
   const std::vector<Cell> cells = CellsOf(protocol);
   CellStore store(PartialFile(request, kFigureTblName), result.settings);
-  if (!MeasureAll(world, cells, request, store)) return result;
+  store.Adopt(PartialFilesOf(request, kFigureTblName), result.settings);
+  if (!MeasureAll(world, cells, request, store) || request.shard) return result;
 
   result.complete = true;
   result.table.columns = {"cost",        "cells_per_axis", "hypotheses",   "policy",        "walks",      "localized",

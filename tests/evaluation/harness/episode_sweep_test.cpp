@@ -1,5 +1,6 @@
 // Laws of episode experiments: the statistics are those of the records, nothing else; an interrupted sweep that is run
-// again ends with the records of one that was never interrupted; a folder begun under other settings is refused.
+// again ends with the records of one that was never interrupted; a folder begun under other settings is refused; the
+// records of shards are those of the whole, each of them asked for once.
 
 #include "feeler/evaluation/harness/episode_sweep.h"
 
@@ -117,6 +118,53 @@ TEST_F(EpisodeSweepTest, AnInterruptedSweepGoesOn) {
   EpisodeSetting other = setting_;
   other.noise = "friction";
   EXPECT_THROW(EpisodeSweep("sweep", {other}, request).Run(), InputError);
+}
+
+TEST_F(EpisodeSweepTest, ShardsMakeTheWhole) {
+  setting_.episodes = 4;
+  EpisodeSetting bare = setting_;
+  bare.name = "small bare";
+  bare.ladder = false;
+  bare.bare_of = setting_.name;
+  const std::vector<EpisodeSetting> settings = {setting_, bare};
+  EpisodeSweep whole("sweep", settings, Request(Folder("in one")));
+  ASSERT_TRUE(whole.Run());
+
+  std::vector<std::string> folders;
+  for (int i = 1; i <= 3; ++i) {
+    ExperimentRequest request = Request(Folder("shard" + std::to_string(i)));
+    request.shard = workflow::Shard{i, 3};
+    EpisodeSweep shard("sweep", settings, request);
+    EXPECT_FALSE(shard.Run()) << "a part is no whole";
+    std::vector<std::int64_t> numbers;
+    for (const json& record : shard.Records(setting_)) numbers.push_back(record.at("episode"));
+    EXPECT_EQ(numbers, workflow::NumbersOfShard(0, 4, request.shard));
+    folders.push_back(request.out);
+  }
+  ExperimentRequest merged = Request(Folder("merged"));
+  merged.from = folders;
+  int run = 0;
+  merged.progress = [&](std::int64_t, std::int64_t) { ++run; };
+  EpisodeSweep all("sweep", settings, merged);
+  ASSERT_TRUE(all.Run());
+  EXPECT_EQ(run, 0) << "everything was there";
+  for (const EpisodeSetting& setting : settings) {
+    EXPECT_EQ(WithoutTiming(all.Records(setting)), WithoutTiming(whole.Records(setting))) << setting.name;
+  }
+
+  ExperimentRequest twice = Request(Folder("twice"));
+  twice.from = {folders[0], folders[1], folders[0]};
+  EXPECT_THROW(EpisodeSweep("sweep", settings, twice).Run(), InputError);
+  ExperimentRequest foreign = Request(Folder("foreign"));
+  foreign.seed = 6;
+  foreign.from = folders;
+  EXPECT_THROW(EpisodeSweep("sweep", settings, foreign).Run(), InputError);
+  // One is missing: what it would have brought is run.
+  ExperimentRequest rest = Request(Folder("rest"));
+  rest.from = {folders[0], folders[2]};
+  EpisodeSweep completed("sweep", settings, rest);
+  ASSERT_TRUE(completed.Run());
+  EXPECT_EQ(WithoutTiming(completed.Records(setting_)), WithoutTiming(whole.Records(setting_)));
 }
 
 TEST_F(EpisodeSweepTest, WhatNeededNoFallbackIsTheSameWithoutTheLadder) {
