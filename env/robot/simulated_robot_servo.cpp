@@ -52,6 +52,15 @@ ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const 
   const double damping = 2.0 / (largest_impedance * time_constant_s);
   contact.stiffness_n_m = contact.mass_kg() * stiffness;
   contact.damping_ratio = damping / (2.0 * std::sqrt(stiffness));
+  // While a late sensor says nothing the drive presses on: the reference of the held mass runs ahead, and by then the
+  // contact has taken the speed. Told as a longer reaction of the parts alone.
+  if (noise_.force_delay_s > 0.0) {
+    const double delay_s = noise_.force_delay_s;
+    const double bandwidth = options_.tracking.bandwidth_rad_s;
+    const double ahead = bandwidth * bandwidth * delay_s;  // per kg and m/s
+    const double stopped = 2.0 * options_.tracking.damping_ratio * bandwidth * (1.0 - std::exp(-damping * delay_s));
+    contact.reaction_time_s += contact.held_mass_kg * (ahead + stopped) / contact.stiffness_n_m;
+  }
   return contact;
 }
 

@@ -99,7 +99,7 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
   CheckLimits();
   const Eigen::Vector3d way = target - position_;
   double speed_m_s = options_.transfer_speed_m_s;
-  if (record_.careful && !way.isZero()) speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
+  if (Careful() && !way.isZero()) speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
   const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
   const MotionReport report = Finish(result, target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
@@ -139,6 +139,8 @@ void Mover::Retreat(const Eigen::Vector3d& target) {
   robot_.ZeroWrench();
 }
 
+bool Mover::Careful() const { return record_.careful || !record_.ladder.empty(); }
+
 double Mover::SpeedInto(const Eigen::Vector3d& direction) const {
   const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
   const auto nearest = DirectionOf(direction);
@@ -153,7 +155,7 @@ MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> 
   motion.speed_m_s = options_.insertion_speed_m_s;
   const Eigen::Vector3d way = target - position_;
   if (!way.isZero()) motion.speed_m_s = std::min(motion.speed_m_s, SpeedInto(way.normalized()));
-  if (speed_m_s) motion.speed_m_s = *speed_m_s;
+  if (speed_m_s) motion.speed_m_s = Careful() ? std::min(*speed_m_s, motion.speed_m_s) : *speed_m_s;
   if (!rests) motion.rest_time_s = 0.0;
   motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);

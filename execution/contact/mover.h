@@ -77,6 +77,8 @@ class Mover {
  private:
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
   void CheckLimits() const;
+  /// The world is not as the policy knows it: its plan has failed, or a transfer met something hard.
+  bool Careful() const;
   /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
   MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,
                       const PredictedCells& predicted, bool shortfall);

@@ -16,4 +16,5 @@ with tempfile.TemporaryDirectory() as folder:
     subprocess.run([os.path.join(build, "feeler"), "preprocess", "--task", "plug", "--out", db, "--family", "3x3x3"],
                    check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     sys.exit(subprocess.run([sys.executable, os.path.join(ROOT, "integrations", "ur", "double", "run_double.py"), "--build",
-                             build, "--db", db, "--extents", "3x3x3", "--episodes", episodes, "--seed", "3"]).returncode)
+                             build, "--db", db, "--extents", "3x3x3", "--episodes", episodes, "--seed", "3",
+                             "--link-timeout", "10"]).returncode)

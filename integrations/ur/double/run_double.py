@@ -46,8 +46,12 @@ def main():
     parser.add_argument("--extents", default="3x3x3")
     parser.add_argument("--episodes", type=int, default=1)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--link-timeout", type=float, default=0.1,
+                        help="s, the script's LINK_TIMEOUT: more where the double may be kept waiting (default: as it is)")
     parser.add_argument("--out", help="records, one JSON object a line")
     options = parser.parse_args()
+    with open(options.script) as file:
+        script = file.read().replace("LINK_TIMEOUT = 0.1 ", f"LINK_TIMEOUT = {options.link_timeout:g} ")
     robot_port, execute_port = free_port(), free_port()
     simulation = subprocess.Popen(
         [os.path.join(options.build, "feeler"), "simulate", "--task", options.task, "--listen",
@@ -66,8 +70,7 @@ def main():
                 command += ["--out", f"{options.out}.{number}"]
             execute = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             controller = Controller(arm, "127.0.0.1", execute_port)
-            with open(options.script) as script:
-                interpreter = Interpreter(script.read(), controller.primitives())
+            interpreter = Interpreter(script, controller.primitives())
             for _ in interpreter.steps():
                 if arm.protective:
                     break  # a controller in a protective stop runs no program

@@ -127,7 +127,8 @@ TEST_F(EpisodeSweepTest, ShardsMakeTheWhole) {
   bare.ladder = false;
   bare.bare_of = setting_.name;
   const std::vector<EpisodeSetting> settings = {setting_, bare};
-  EpisodeSweep whole("sweep", settings, Request(Folder("in one")));
+  const ExperimentRequest in_one = Request(Folder("in one"));
+  EpisodeSweep whole("sweep", settings, in_one);
   ASSERT_TRUE(whole.Run());
 
   std::vector<std::string> folders;

@@ -3,7 +3,8 @@
 //   - the first probe into it may pass the budget; no later one in its direction does, and other directions stay as
 //   fast;
 //   - a probe into what holds the tool is slower by the masses;
-//   - after a transfer that met something above the budget, transfers keep within it; before, they go at full speed.
+//   - after a transfer that met something above the budget, transfers keep within it; before, they go at full speed;
+//   - once the plan has failed, transfers and insertions keep within it.
 #include "feeler/execution/contact/mover.h"
 
 #include <gtest/gtest.h>
@@ -114,6 +115,16 @@ TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {
     mover.Fast({4.0, 3.0 * i, 0.0}, "transfer");
     EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
   }
+}
+
+TEST(Mover, RecoveryKeepsWithinTheBudgetFromItsStart) {
+  Bench bench(1.0);
+  bench.record.ladder.push_back({"refit", "off the policy tree"});
+  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  mover.Fast({4.0, 0.0, 0.0}, "transfer");
+  EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
+  mover.Insert({4.0, 0.0, -6.0}, bench.options.transfer_speed_m_s, false);
+  EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0) << "nor is a way in known to be free";
 }
 
 }  // namespace

@@ -25,9 +25,12 @@ class ContactResponseTest : public ::testing::Test {
   SimulatedRobot robot_{scene_};
 
   void Place(const Eigen::Vector3d& displacement_m) {
-    robot_.Reset(At(*scene_, ToolAt(*scene_, displacement_m)), scene_->task.world_T_target, NoisePreset("ideal"),
+    NoiseOptions noise = NoisePreset("ideal");
+    noise.force_delay_s = delay_s_;
+    robot_.Reset(At(*scene_, ToolAt(*scene_, displacement_m)), scene_->task.world_T_target, noise,
                  RandomStream(1, 0, "sensor"));
   }
+  double delay_s_ = 0.0;  ///< of the force sensor
   Eigen::Vector3d InWorld(const Eigen::Vector3d& direction) const {
     return scene_->task.world_T_target.linear() * direction;
   }
@@ -79,6 +82,19 @@ TEST_F(ContactResponseTest, TheSpeedOfABudgetKeepsIt) {
       const double peak_n = PeakForce(wall, speed_m_s);
       EXPECT_LE(peak_n, budget_n) << wall.direction.transpose() << " at " << speed_m_s;
       EXPECT_GE(peak_n, 0.4 * budget_n) << wall.direction.transpose() << " at " << speed_m_s;
+    }
+  }
+}
+
+TEST_F(ContactResponseTest, ALateSensorIsCountedWith) {
+  for (const double delay_s : {0.003, 0.008}) {
+    delay_s_ = delay_s;
+    for (const Wall& wall : walls_) {
+      Place(wall.start_m);
+      const double speed_m_s = execution::SpeedWithinBudget(robot_.Contact(InWorld(wall.direction)), 25.0);
+      const double peak_n = PeakForce(wall, speed_m_s);
+      EXPECT_LE(peak_n, 25.0) << wall.direction.transpose() << " at " << speed_m_s << ", late by " << delay_s;
+      EXPECT_GE(peak_n, 5.0);
     }
   }
 }
