@@ -11,6 +11,7 @@
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
 #include "feeler/cli/db_summary.h"
+#include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
@@ -117,6 +118,23 @@ void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily
         many.committing_s);
 }
 
+/// Problems of the file that no touch solves: they are not failures of the solver.
+void NoteUnlocalizable(const Flags& flags, const Task& task) {
+  policies::Database database = policies::Database::OpenReadOnly(flags.out);
+  std::int64_t count = 0;
+  std::string example;
+  for (const policies::StoredProblem& problem : database.List()) {
+    if (problem.status != planner::ToString(planner::SolverStatus::kUnlocalizable)) continue;
+    if (count++ == 0) example = planner::ToString(problem.extents, task);
+  }
+  if (count == 0) return;
+  Note(
+      "feeler: {} problems are unlocalizable, {} for example: no touch tells some of their hypotheses apart (feeler "
+      "task "
+      "check {} says why)\n",
+      count, example, flags.task);
+}
+
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (flags.out.empty() && !flags.estimate) {
     throw InputError("--out", "missing", "give the database to write, or --estimate");
@@ -137,6 +155,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   inputs.push_back(flags.family);
   if (!session.serves()) RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, inputs);
 
+  CheckQuickly(flags.task, ParseOpening(flags.opening));
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
   setup_options.opening = ParseOpening(flags.opening);
@@ -175,6 +194,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   Note("{} problems: {} solved now, {} already there, {} failed; {:.1f} s wall, {:.1f} s CPU{}\n", summary.problems,
        summary.complete, summary.skipped, summary.failed, summary.wall_s, summary.cpu_s,
        summary.cancelled ? "; interrupted, run the same command again to go on" : "");
+  if (summary.failed > 0) NoteUnlocalizable(flags, setup.task());
   if (summary.helpers > 0) Note("{} problems of other shards solved for their policies\n", summary.helpers);
   NoteRanks(session, summary.complete + summary.failed);
   if (flags.json) {

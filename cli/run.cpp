@@ -18,6 +18,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
@@ -199,6 +200,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (database) setup_options = workflow::SetupOptionsOf(database->identity());
   setup_options.jobs = jobs;
   setup_options.progress = Interruptible(map_bar, session);
+  CheckQuickly(flags.task, setup_options.opening);
   std::shared_ptr<const workflow::PlanningSetup> setup;
   session.OncePerHost([&] {
     setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));

@@ -1,6 +1,7 @@
 // feeler solve: one problem, of a task or from a lattice file.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <memory>
@@ -17,7 +18,9 @@
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/bounds/planning_tables.h"
 #include "feeler/planner/family/problem_family.h"
+#include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/workflow/setup/database_builder.h"
 
@@ -88,6 +91,22 @@ void PrintResult(const planner::SolverResult& result, const std::string& unit) {
   Print("expansions     {}\nCPU, wall      {:.3f} s, {:.3f} s\n", result.expansions, result.cpu_s, result.wall_s);
 }
 
+/// Says which hypotheses no probe tells apart, ten pairs of them; returns how many pairs there are.
+std::int64_t NoteAlike(const planner::Problem& problem, const planner::ContactMasks& masks,
+                       const planner::SolverResult& result, const std::string& task) {
+  constexpr std::size_t kShown = 10;
+  const std::int64_t count = planner::CountIndistinguishablePairs(problem, masks);
+  const std::size_t shown = std::min(result.indistinguishable.size(), kShown);
+  Note("feeler: {} pairs of hypotheses cannot be told apart by any probe{}:\n", count,
+       count > static_cast<std::int64_t>(shown) ? fmt::format(", {} of them", shown) : "");
+  for (std::size_t k = 0; k < shown; ++k) {
+    const auto& [i, j] = result.indistinguishable[k];
+    Note("  {} {} and {} {}\n", i, NameOf(problem, i), j, NameOf(problem, j));
+  }
+  if (!task.empty()) Note("feeler task check {} says why, and what would help\n", task);
+  return count;
+}
+
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (!flags.pomdp.pomdp.empty()) {
     return RunSolvePomdp(command, flags.pomdp, flags.solver, flags.out, flags.json, session);
@@ -119,12 +138,9 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   table_bar.Finish();
   const planner::SolverResult result = planner::Solve(problem, options, tables);
 
-  if (result.status == planner::SolverStatus::kUnlocalizable) {
-    Note("feeler: {} pairs of hypotheses cannot be told apart by any probe:\n", result.indistinguishable.size());
-    for (const auto& [i, j] : result.indistinguishable) {
-      Note("  {} {} and {} {}\n", i, NameOf(problem, i), j, NameOf(problem, j));
-    }
-  }
+  const std::int64_t alike = result.status == planner::SolverStatus::kUnlocalizable
+                                 ? NoteAlike(problem, tables->masks(), result, flags.task)
+                                 : 0;
   if (result.complete() && !flags.out.empty())
     WritePolicy(problem, *result.policy, flags.task.empty() ? problem.name : flags.task, flags.out);
   const std::string unit = workflow::CostUnit(ParseCost(flags.cost), problem.cost);
@@ -148,6 +164,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                {"wall_s", result.wall_s},
                {"tables_cpu_s", tables_cpu_s},
                {"policy_nodes", result.complete() ? result.policy->nodes.size() : 0},
+               {"indistinguishable_pairs", alike},
                {"indistinguishable", pairs}});
   } else {
     PrintResult(result, unit);

@@ -16,6 +16,7 @@
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
 #include "feeler/cli/solver_flags.h"
+#include "feeler/cli/task/task_check.h"
 #include "feeler/cli/task/task_import.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
@@ -109,8 +110,8 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
 void PrintVisibility(const env::AxisVisibility& axis) {
   if (!axis.felt()) {
     Print(
-        "felt           {}: NOT SEEN by contact (no probe differs by more than {:.3f} cells): drop the axis, or give "
-        "the part a feature\n",
+        "felt           {}: NOT SEEN by contact (no probe differs by more than {:.3f} cells): feeler task check "
+        "says what would help\n",
         ToString(axis.kind), axis.largest_difference_cells);
     return;
   }
@@ -233,6 +234,7 @@ void AddTaskCommand(CLI::App& app, Session& session) {
   render->add_flag("--no-lids", flags->no_lids, "section, mouth: without what closes the opening while localizing");
   render->add_option("--out", flags->out, "PNG file to write")->required();
   render->callback([flags] { Render(*flags); });
+  AddTaskCheck(*task, session);
   AddTaskImport(*task, session);
 
   CLI::App* pipes =

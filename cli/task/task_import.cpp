@@ -14,11 +14,13 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/evaluation/cad_import/import_report.h"
 #include "feeler/evaluation/cad_import/import_task.h"
 #include "feeler/evaluation/cad_import/trial.h"
+#include "feeler/workflow/check/task_check.h"
 
 namespace feeler::cli {
 namespace {
@@ -154,16 +156,32 @@ void Print(const evaluation::ImportedTask& task, const std::string& verdict) {
   cli::Print("cell           {:.4g} mm, margin {:.3f} cells\n", 1000 * task.content.numbers.cell_m,
              task.content.numbers.margin_cells);
   for (const std::string& note : task.notes) cli::Print("note           {}\n", note);
+  for (const env::TaskFinding& finding : task.findings) cli::Print("finding        {}\n", LineOf(finding));
   cli::Print("verdict        {}\n", verdict);
+}
+
+/// What `feeler task check` says of the written task: all of it where contact maps are built for a trial anyway.
+env::TaskFindings Findings(const evaluation::ImportedTask& task, bool with_touch, Parallelism jobs,
+                           const Session& session) {
+  ProgressBar bar("contact map");
+  workflow::TaskCheckOptions options;
+  options.jobs = jobs;
+  options.progress = Interruptible(bar, session);
+  options.touch = with_touch;
+  env::TaskFindings findings = workflow::CheckTask(task.task_file.string(), options);
+  bar.Finish();
+  return findings;
 }
 
 void Import(const Flags& flags, Session& session) {
   const evaluation::ImportOptions options = OptionsFrom(flags);
   const Parallelism jobs = Parallelism(flags.jobs);
   if (flags.episodes < 1) throw InputError("--episodes", "fewer than 1", "use --no-trial for none");
-  const evaluation::ImportedTask task = evaluation::ImportTask(options);
+  evaluation::ImportedTask task = evaluation::ImportTask(options);
+  const bool tried = !flags.no_trial && !session.cancellation->cancelled();
+  task.findings = Findings(task, tried, jobs, session);
   std::optional<evaluation::Trial> trial;
-  if (!flags.no_trial && !session.cancellation->cancelled()) {
+  if (tried) {
     evaluation::TrialOptions trial_options;
     trial_options.episodes = flags.episodes;
     trial_options.jobs = jobs;
@@ -180,6 +198,7 @@ void Import(const Flags& flags, Session& session) {
     nlohmann::json json = task.json;
     json["task"] = task.task_file.string();
     json["verdict"] = verdict;
+    json["findings"] = ToJson(task.findings);
     if (trial) {
       nlohmann::json runs = nlohmann::json::array();
       for (const evaluation::TrialRun& run : trial->runs) {

@@ -1,10 +1,13 @@
 #include "feeler/env/arm/urdf_to_mjcf.h"
 
 #include <console_bridge/console.h>
+#include <fmt/format.h>
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <fstream>
 #include <numbers>
 #include <set>
@@ -12,6 +15,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/model/mujoco_handles.h"
+#include "feeler/env/mjcf/plain_locale.h"
 
 namespace feeler::env {
 namespace {
@@ -29,6 +33,7 @@ class KeepMessage : public console_bridge::OutputHandler {
 };
 
 urdf::ModelInterfaceSharedPtr ReadUrdf(const std::string& file) {
+  const PlainLocale plain;
   static KeepMessage handler;
   console_bridge::useOutputHandler(&handler);
   std::ifstream in(file, std::ios::binary);
@@ -75,11 +80,59 @@ class Emitter {
     throw InputError(file_, what, mend);
   }
 
+  void RequireFinite(const urdf::Pose& pose, const char* element, const std::string& name) const {
+    const auto& p = pose.position;
+    const auto& r = pose.rotation;
+    for (const double value : {p.x, p.y, p.z, r.x, r.y, r.z, r.w}) {
+      if (std::isfinite(value)) continue;
+      throw InputError(fmt::format("{}: <{} name=\"{}\">", file_, element, name), "its <origin> is not finite",
+                       "give finite numbers");
+    }
+  }
+
+  /// A mass and moments of inertia that a body can have.
+  void RequireSane(const urdf::Inertial& inertial, const Eigen::Matrix3d& inertia, const std::string& link) const {
+    const std::string where = fmt::format("{}: <link name=\"{}\"><inertial>", file_, link);
+    if (!(inertial.mass > 0 && inertial.mass < 1e4)) {
+      throw InputError(where, fmt::format("mass {} is not in 0 to 10000 kg", inertial.mass), "give the mass in kg");
+    }
+    if (!inertia.allFinite()) throw InputError(where, "the inertia is not finite", "give finite numbers");
+    const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia).eigenvalues();
+    if (moments[0] <= 0 || moments[0] + moments[1] < moments[2] * (1 - 1e-6)) {
+      throw InputError(where,
+                       fmt::format("no body has the principal moments of inertia {:.3g}, {:.3g}, {:.3g} kg m^2",
+                                   moments[0], moments[1], moments[2]),
+                       "all are positive, and none exceeds the sum of the others");
+    }
+  }
+
+  void RequireSane(const urdf::Joint& joint) const {
+    const std::string where = fmt::format("{}: <joint name=\"{}\">", file_, joint.name);
+    const auto& a = joint.axis;
+    const double length = std::sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
+    if (!(std::abs(length - 1) < 1e-3))
+      throw InputError(where, fmt::format("its <axis> has length {}", length), "give a unit vector");
+    const auto& limits = *joint.limits;
+    if (!std::isfinite(limits.lower) || !std::isfinite(limits.upper) || !(limits.lower < limits.upper)) {
+      throw InputError(where, fmt::format("its limits are {} to {} rad", limits.lower, limits.upper),
+                       "the lower is less than the upper");
+    }
+    if (!std::isfinite(limits.effort) || !std::isfinite(limits.velocity)) {
+      throw InputError(where, "its effort or velocity is not finite", "give the torque in Nm and rad/s");
+    }
+    if (joint.dynamics && !(joint.dynamics->damping >= 0 && joint.dynamics->friction >= 0)) {
+      throw InputError(where, "its <dynamics> are negative or not finite", "give 0 or more");
+    }
+  }
+
   void EmitLink(const urdf::Link& link, const urdf::Joint* joint, XMLElement& body) {
     body.SetAttribute("name", link.name.c_str());
-    if (joint != nullptr) SetPose(joint->parent_to_joint_origin_transform, body);
+    if (joint != nullptr) {
+      RequireFinite(joint->parent_to_joint_origin_transform, "joint", joint->name);
+      SetPose(joint->parent_to_joint_origin_transform, body);
+    }
     if (link.inertial) {
-      EmitInertial(*link.inertial, body);
+      EmitInertial(*link.inertial, link.name, body);
     } else if (joint != nullptr && joint->type != urdf::Joint::FIXED) {
       Fail("moving link '" + link.name + "' has no <inertial>", "give its mass and inertia");
     }
@@ -104,13 +157,15 @@ class Emitter {
     }
   }
 
-  void EmitInertial(const urdf::Inertial& inertial, XMLElement& body) {
+  void EmitInertial(const urdf::Inertial& inertial, const std::string& link, XMLElement& body) {
+    RequireFinite(inertial.origin, "link", link);
     XMLElement& element = *body.InsertNewChildElement("inertial");
     // MJCF takes either a full inertia in the axes of the body or a diagonal one with an orientation: turn the tensor.
     const Eigen::Matrix3d axes = Rotation(inertial.origin.rotation);
     Eigen::Matrix3d inertia;
     inertia << inertial.ixx, inertial.ixy, inertial.ixz, inertial.ixy, inertial.iyy, inertial.iyz, inertial.ixz,
         inertial.iyz, inertial.izz;
+    RequireSane(inertial, inertia, link);
     inertia = axes * inertia * axes.transpose();
     const auto& p = inertial.origin.position;
     element.SetAttribute("pos", MjcfVector(Eigen::Vector3d(p.x, p.y, p.z)).c_str());
@@ -126,6 +181,7 @@ class Emitter {
       Fail("joint '" + joint.name + "' is not revolute with limits of position, effort and velocity",
            "use type=\"revolute\" with a complete <limit>, or type=\"fixed\"");
     }
+    RequireSane(joint);
     const std::size_t index = result_.joints.size();
     const double unit = options_.angles_in_degrees ? 180.0 / std::numbers::pi : 1.0;
     const double friction = index < options_.joint_friction_nm.size()
@@ -158,6 +214,7 @@ class Emitter {
   XMLElement& EmitGeom(const urdf::GeometrySharedPtr& shape, const urdf::Pose& origin, const std::string& link,
                        XMLElement& body) {
     if (!shape) Fail("a shape of link '" + link + "' has no geometry", "give it a box, cylinder or sphere");
+    RequireFinite(origin, "link", link);
     XMLElement& geom = *body.InsertNewChildElement("geom");
     SetPose(origin, geom);
     geom.SetAttribute("mass", 0);

@@ -96,6 +96,12 @@ RobotState SimulatedRobot::Save() const {
 }
 
 void SimulatedRobot::Restore(const RobotState& s) {
+  const bool finite = s.encoder_offset.allFinite() && s.deflection.allFinite() && s.measured_q.allFinite() &&
+                      s.held_orientation.allFinite() && s.tool_at_sensing.matrix().allFinite() &&
+                      (!s.set_point || s.set_point->matrix().allFinite()) && std::isfinite(s.peak_force_n) &&
+                      !std::isnan(s.deadline_s);
+  if (!finite)
+    throw InputError("restore", "the state holds numbers that are not finite", "restore only what this scene saved");
   world_.Restore(s.world);
   noise_ = s.noise;
   sensor_ = s.sensor;

@@ -1,5 +1,7 @@
 #include "feeler/env/scene/gripper.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,6 +20,11 @@ constexpr double kFingerThickness_m = 0.007;
 constexpr double kAdapter_m = 0.012;     // length of the adapter plate on the flange
 constexpr double kPalm_m = 0.095;        // where the palm ends, if the tool leaves room
 constexpr double kFingerRoom_m = 0.025;  // least length of finger between palm and tool
+constexpr double kShortestPalm_m = 0.02;
+constexpr double kLeastFinger_m = 0.005;   // between palm and tool: less is no finger
+constexpr double kLongestFinger_m = 0.08;  // more is none that anyone sells for such parts
+constexpr double kGripper_kg = 0.9;
+constexpr double kPayload_kg = 12.5;  // Universal Robots, UR10e data sheet
 
 // What is round about the approach axis may be gripped from any side.
 bool IsRoundGrip(const mjModel& model, const mjData& data, int geom, const Pose& flange_T_world) {
@@ -124,6 +131,53 @@ GripperFit FitGripper(const mjModel& task_model, const std::vector<int>& tool_ge
   return fit;
 }
 
+double PalmEnd(const GripperFit& fit) { return std::clamp(fit.grip_begin_m - kFingerRoom_m, kShortestPalm_m, kPalm_m); }
+
+TaskFindings HoldFindings(const GripperFit& fit, const Task& task, double tool_mass_kg, const std::string& where) {
+  TaskFindings findings;
+  const auto numeric = [&](const char* field) {
+    return fmt::format("{}: <custom><numeric name=\"{}\">", where, field);
+  };
+  const double z_m = task.flange_T_tool.translation().z();
+  const std::string better =
+      fmt::format("with z = {:.3g} m in feeler_flange_position the fingers have their usual length",
+                  z_m + kPalm_m + kFingerRoom_m - fit.grip_begin_m);
+  const double fingers_m = fit.grip_begin_m - PalmEnd(fit);
+  if (fingers_m < kLeastFinger_m) {
+    findings.push_back(
+        {TaskFinding::Severity::kError, "fingers", numeric("feeler_flange_position"),
+         fmt::format("the tool, {:.0f} mm long beyond its origin, is held {:.0f} mm from the flange: its end "
+                     "stands {:.0f} mm in the palm of the gripper, which ends {:.0f} mm from it",
+                     (z_m - fit.grip_begin_m) * 1000, z_m * 1000, (PalmEnd(fit) - fit.grip_begin_m) * 1000,
+                     PalmEnd(fit) * 1000),
+         better});
+  } else if (fingers_m > kLongestFinger_m) {
+    findings.push_back(
+        {TaskFinding::Severity::kWarning, "fingers", numeric("feeler_flange_position"),
+         fmt::format("the end of the tool is {:.0f} mm from the flange: the fingers are stretched to {:.0f} "
+                     "mm between palm and tool",
+                     fit.grip_begin_m * 1000, fingers_m * 1000),
+         better});
+  }
+  const double ahead = (task.flange_T_tool.linear() * UnitVector(task.insertion)).z();
+  if (ahead < -0.5) {
+    findings.push_back(
+        {TaskFinding::Severity::kError, "upside-down", numeric("feeler_flange_quaternion"),
+         fmt::format("holds the tool upside down: it is inserted along {} of its frame, which points back "
+                     "to the flange",
+                     ToString(task.insertion)),
+         task.insertion == Direction::kMinusZ ? "0 1 0 0 turns the tool's -z away from the flange"
+                                              : "turn the tool's direction of insertion away from it"});
+  }
+  if (tool_mass_kg + kGripper_kg > kPayload_kg) {
+    findings.push_back({TaskFinding::Severity::kError, "payload", fmt::format("{}: <body name=\"tool\">", where),
+                        fmt::format("weighs {:.3g} kg, with the gripper {:.3g} kg: the payload of the UR10e is {} kg",
+                                    tool_mass_kg, tool_mass_kg + kGripper_kg, kPayload_kg),
+                        "give its geoms a mass (without one MuJoCo takes the density of water), or a lighter part"});
+  }
+  return findings;
+}
+
 void EmitGripper(const GripperFit& fit, int visual_group, int collision_group, XMLElement& flange_body) {
   XMLElement& body = *flange_body.InsertNewChildElement("body");
   body.SetAttribute("name", "gripper");
@@ -148,7 +202,7 @@ void EmitGripper(const GripperFit& fit, int visual_group, int collision_group, X
     felt.SetAttribute("conaffinity", 1);
   };
 
-  const double palm_end = std::clamp(fit.grip_begin_m - kFingerRoom_m, 0.02, kPalm_m);
+  const double palm_end = PalmEnd(fit);
   const double palm_half = 0.5 * (palm_end - kAdapter_m);
   const double reach = fit.half_opening_m + kPadThickness_m + kFingerThickness_m;  // outside of a finger
   const double palm_half_x = std::max(0.034, reach + 0.006);

@@ -4,9 +4,12 @@
 #include <tinyxml2.h>
 
 #include <Eigen/Geometry>
+#include <string>
 #include <vector>
 
 #include "feeler/core/pose.h"
+#include "feeler/core/task.h"
+#include "feeler/env/model/task_finding.h"
 
 namespace feeler::env {
 
@@ -24,6 +27,14 @@ struct GripperFit {
 /// the tool body, compiled without a robot.
 GripperFit FitGripper(const mjModel& task_model, const std::vector<int>& tool_geoms, int tool_body,
                       const Pose& flange_T_tool);
+
+/// Where the palm ends, m from the flange.
+double PalmEnd(const GripperFit& fit);
+
+/// Whether arm and gripper can hold the tool so: the tool reaches into the palm, the fingers are stretched, the tool is
+/// upside down (its tip between the fingers), gripper and tool are heavier than the payload of the arm. `where` names
+/// the task file.
+TaskFindings HoldFindings(const GripperFit& fit, const Task& task, double tool_mass_kg, const std::string& where);
 
 /// Emits the gripper as a body named `gripper` under `flange_body`: adapter, palm, two fingers with pads; visual and
 /// collision shapes, 0.9 kg in all. `visual_group` and `collision_group` as for the robot.

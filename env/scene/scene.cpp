@@ -10,6 +10,8 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/arm/urdf_to_mjcf.h"
+#include "feeler/env/mjcf/plain_locale.h"
+#include "feeler/env/model/task_finding.h"
 #include "feeler/env/scene/contact_capacity.h"
 #include "feeler/env/scene/gripper.h"
 #include "feeler/env/scene/physics_model.h"
@@ -205,6 +207,39 @@ void Index(const std::vector<RobotJoint>& joints, const char* root_body, Scene& 
   }
 }
 
+/// The arm as physics has it, from the URDF, is the one that the kinematics of env/arm/ur10e.h solve: each joint's axis
+/// is where they have it, and the flange.
+void RequireKinematicsOfUrdf(const Scene& scene, const std::string& urdf) {
+  constexpr double kNear = 1e-5;  // m, and rad
+  const DataHandle data = MakeData(*scene.model);
+  JointVector q;
+  q << 0.3, -1.1, 0.9, -0.4, 0.7, 0.2;
+  ResetScene(scene, q, *data);
+  const KinematicChain chain = Chain(q);
+  for (std::size_t i = 0; i < kJointCount; ++i) {
+    const Eigen::Map<const Eigen::Vector3d> axis(data->xaxis + 3 * scene.joint[i]);
+    const Eigen::Map<const Eigen::Vector3d> anchor(data->xanchor + 3 * scene.joint[i]);
+    const double turned = axis.cross(chain.axis[i]).norm() + (axis.dot(chain.axis[i]) < 0 ? 1.0 : 0.0);
+    const double beside_m = (anchor - chain.origin_m[i]).cross(chain.axis[i]).norm();
+    if (turned < kNear && beside_m < kNear) continue;
+    throw InputError(
+        fmt::format("{}: <joint name=\"{}\">", urdf, kJointNames[i]),
+        fmt::format("its axis lies {:.3g} mm and {:.3g} rad from where the UR10e has it, by whose kinematics "
+                    "the arm is moved",
+                    beside_m * 1000, turned),
+        "correct the <origin> of this joint, or of one before it");
+  }
+  const Pose flange = BodyPose(*data, scene.flange_body);
+  const double off_m = (flange.translation() - chain.base_T_flange.translation()).norm();
+  const double turned = Eigen::AngleAxisd(flange.linear().transpose() * chain.base_T_flange.linear()).angle();
+  if (off_m < kNear && turned < kNear) return;
+  throw InputError(
+      fmt::format("{}: <link name=\"tool0\">", urdf),
+      fmt::format("the flange lies {:.3g} mm and {:.3g} rad from where the kinematics of the UR10e have it",
+                  off_m * 1000, turned),
+      "correct the origins of the joints behind wrist 3");
+}
+
 // Geoms named `lid*` anywhere under `body` stay in the model for the contact map, out of physics and pictures.
 void DisarmLids(XMLElement& body) {
   for (XMLElement* geom = body.FirstChildElement("geom"); geom != nullptr; geom = geom->NextSiblingElement("geom")) {
@@ -280,13 +315,27 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   Index(robot.joints, robot.root_body->Attribute("name"), scene);
   constexpr double kQuarter = 0.5 * std::numbers::pi;
   scene.home_q_rad << 0.0, -kQuarter, kQuarter, -kQuarter, -kQuarter, 0.0;
+  RequireKinematicsOfUrdf(scene, urdf);
   return scene;
 }
 
 }  // namespace
 
+namespace {
+
+/// A tool that the gripper has no place for, or the arm no strength, fails here, by name, before anything moves.
+void RequireHoldable(const GripperFit& gripper, const Task& task, double tool_mass_kg) {
+  for (const TaskFinding& finding : HoldFindings(gripper, task, tool_mass_kg, task.file.empty() ? "task" : task.file)) {
+    if (finding.kind == "fingers" || finding.kind == "payload") RequireNoError({finding});
+  }
+}
+
+}  // namespace
+
 Scene BuildScene(const TaskModel& task, const SceneOptions& options) {
+  const PlainLocale plain;
   const GripperFit gripper = FitGripper(*task.model, task.tool_geoms, task.tool_body, task.task.flange_T_tool);
+  RequireHoldable(gripper, task.task, task.model->body_subtreemass[task.tool_body]);
   SceneOptions sized = options;
   const SceneOptions least;
   if (options.max_constraints == least.max_constraints && options.max_contacts == least.max_contacts) {
@@ -299,6 +348,7 @@ Scene BuildScene(const TaskModel& task, const SceneOptions& options) {
 
 Scene BuildScene(const Task& task, const std::string& task_xml, const std::string& models_folder,
                  const SceneOptions& options) {
+  const PlainLocale plain;
   const std::string where = task.file.empty() ? "task" : task.file;
   const ModelHandle alone = CompileMjcf(task_xml, where);
   const int tool_body = mj_name2id(alone.get(), mjOBJ_BODY, "tool");

@@ -1,9 +1,11 @@
 #include "feeler/env/scene/world.h"
 
 #include <fmt/format.h>
+#include <mujoco/mjxmacro.h>
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "feeler/core/error.h"
@@ -21,7 +23,8 @@ bool AllBelow(const double* values, int count, double limit) {
   return std::all_of(values, values + count, [limit](double v) { return std::abs(v) < limit; });
 }
 
-// FNV-1a over what tells one scene from another.
+/// Of everything in the model that physics reads: every array but names, texts, numbers of the task file and textures,
+/// and the options.
 std::uint64_t Fingerprint(const mjModel& m) {
   std::uint64_t hash = 14695981039346656037U;
   const auto add = [&hash](const void* data, std::size_t bytes) {
@@ -29,18 +32,39 @@ std::uint64_t Fingerprint(const mjModel& m) {
       hash = (hash ^ *byte) * 1099511628211U;
     }
   };
-  const auto count = [](int n) { return static_cast<std::size_t>(n); };
-  add(m.geom_type, count(m.ngeom) * sizeof(int));
-  add(m.geom_size, count(3 * m.ngeom) * sizeof(mjtNum));
-  add(m.geom_pos, count(3 * m.ngeom) * sizeof(mjtNum));
-  add(m.body_pos, count(3 * m.nbody) * sizeof(mjtNum));
-  add(m.body_mass, count(m.nbody) * sizeof(mjtNum));
-  add(m.mesh_vert, count(3 * m.nmeshvert) * sizeof(float));
-  add(&m.opt.timestep, sizeof(mjtNum));
+  const auto counts = [](std::string_view name) {
+    return !name.starts_with("name") && !name.starts_with("tex_") && !name.starts_with("text_") &&
+           !name.starts_with("numeric_") && !name.starts_with("mat_");
+  };
+  MJMODEL_POINTERS_PREAMBLE((&m))
+#define X(type, name, rows, columns) \
+  if (counts(#name)) add(m.name, sizeof(type) * static_cast<std::size_t>(m.rows) * static_cast<std::size_t>(columns));
+  MJMODEL_POINTERS
+#undef X
+#define X(type, name) add(&m.opt.name, sizeof(type));
+  MJOPTION_SCALARS
+#undef X
+#define X(name, count) add(m.opt.name, sizeof(mjtNum) * (count));
+  MJOPTION_VECTORS
+#undef X
   return hash;
 }
 
 std::vector<double> Copy(const double* values, int count) { return {values, values + count}; }
+
+bool Finite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+bool Finite(const WorldState& s) {
+  return std::isfinite(s.time_s) && s.time_s >= 0 && Finite(s.qpos) && Finite(s.qvel) && Finite(s.warmstart) &&
+         Finite(s.mocap_pos) && Finite(s.mocap_quat) && s.tool_at_contact.matrix().allFinite() &&
+         s.applied_torque_nm.allFinite() &&
+         std::all_of(s.contacts.begin(), s.contacts.end(), [](const ContactForce& c) {
+           return c.point_m.allFinite() && c.force_n.allFinite() && c.torque_nm.allFinite() &&
+                  std::isfinite(c.distance_m);
+         });
+}
 
 }  // namespace
 
@@ -184,6 +208,8 @@ void World::Restore(const WorldState& s) {
       !fits(s.mocap_quat, 4 * model_->nmocap)) {
     throw InputError("restore", "the state belongs to another model", "restore only what this scene saved");
   }
+  if (!Finite(s))
+    throw InputError("restore", "the state holds numbers that are not finite", "restore only what this scene saved");
   if (!AllBelow(s.qpos.data(), model_->nq, kAbsurdVelocity) || !AllBelow(s.qvel.data(), model_->nv, kAbsurdVelocity)) {
     throw InputError("restore", "the state holds absurd positions or velocities", "restore only what this scene saved");
   }

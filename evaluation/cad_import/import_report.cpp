@@ -205,6 +205,13 @@ std::string ImportReport(const ImportedTask& task, const std::optional<Trial>& t
     for (const std::string& note : task.notes) html += fmt::format("<li>{}</li>\n", Html(note));
     html += "</ul>\n";
   }
+  if (!task.findings.empty()) {
+    html += "<h2>What may be wrong: <code>feeler task check</code></h2>\n<ul>\n";
+    for (const env::TaskFinding& finding : task.findings) {
+      html += fmt::format("<li>{} ({})</li>\n", Html(finding.what), Html(finding.mend));
+    }
+    html += "</ul>\n";
+  }
   html += "<h2>How the parts mate</h2>\n" + MatingTable(task) + Drawings(task);
   html += "<h2>Parts, and their convex pieces</h2>\n" + PartTable(task);
   html += "<h2>As the simulator has them</h2>\n" + Pictures(task);

@@ -15,6 +15,7 @@
 #include "feeler/cad/mesh/mesh_check.h"
 #include "feeler/core/pose.h"
 #include "feeler/env/model/task_file.h"
+#include "feeler/env/model/task_finding.h"
 
 namespace feeler::evaluation {
 
@@ -64,6 +65,7 @@ struct ImportedTask {
   cad::TaskContent content;
   cad::Walls walls;
   std::vector<std::string> notes;  ///< choices and warnings, a sentence each
+  env::TaskFindings findings;      ///< of CheckTask, where it was asked; not in `json`
   nlohmann::json json;             ///< import.json
   std::filesystem::path task_file;
   bool flush_x = false;  ///< no side across x can be felt from outside

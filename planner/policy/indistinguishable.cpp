@@ -155,4 +155,25 @@ std::vector<std::pair<int, int>> IndistinguishablePairs(const Problem& problem, 
   return pairs;
 }
 
+std::int64_t CountIndistinguishablePairs(const Problem& problem, const ContactMasks& masks) {
+  std::int64_t pairs = 0;
+  Refiner refiner(problem, masks);
+  for (const auto& slabs : refiner.Classes()) {
+    const std::vector<int> members = refiner.Indices(slabs);
+    const auto n = static_cast<std::int64_t>(members.size());
+    if (problem.goal == GoalKind::kSingleton) {
+      pairs += n * (n - 1) / 2;
+      continue;
+    }
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      for (std::size_t j = i + 1; j < members.size(); ++j) {
+        const Hypothesis& a = problem.hypotheses[static_cast<std::size_t>(members[i])];
+        const Hypothesis& b = problem.hypotheses[static_cast<std::size_t>(members[j])];
+        if (!IsGoal(problem, {a, b})) ++pairs;
+      }
+    }
+  }
+  return pairs;
+}
+
 }  // namespace feeler::planner

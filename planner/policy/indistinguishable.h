@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -14,5 +15,8 @@ namespace feeler::planner {
 /// class, split it by every probe met, repeat with the parts.
 std::vector<std::pair<int, int>> IndistinguishablePairs(const Problem& problem, const ContactMasks& masks,
                                                         std::size_t most_pairs = 1000);
+
+/// How many there are in all.
+std::int64_t CountIndistinguishablePairs(const Problem& problem, const ContactMasks& masks);
 
 }  // namespace feeler::planner

@@ -1,6 +1,7 @@
 #include "feeler/policies/storage/database_sink.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "feeler/version.h"
@@ -30,7 +31,8 @@ StoredProblem ToStoredProblem(const planner::Extents& extents, const planner::So
   problem.status = ToString(result.status);
   problem.solver = ToString(options.solver);
   (problem.certified() ? problem.gap : problem.epsilon) = problem.certified() ? options.gap : options.epsilon;
-  problem.lower_bound = result.lower_bound;
+  // Of a problem that no policy solves the cost is infinite, which a row cannot hold: nothing is proven there.
+  problem.lower_bound = std::isfinite(result.lower_bound) ? result.lower_bound : 0.0;
   problem.expansions = result.expansions;
   problem.seed = options.seed;
   problem.version = FEELER_VERSION;
