@@ -25,9 +25,13 @@ void RequireWithin(double value, double limit, const char* where, const char* wh
   }
 }
 
+/// Each component within the limit, as in the box of ActionSpace.
 void RequireWithin(const Eigen::Vector3d& v, double limit, const char* where, const char* what) {
-  if (!(v.norm() <= limit)) {
-    throw InputError(where, fmt::format("{} has size {}", what, v.norm()), fmt::format("give at most {}", limit));
+  for (const double value : v) {
+    if (!(std::abs(value) <= limit)) {
+      throw InputError(where, fmt::format("{} has a component of {}", what, value),
+                       fmt::format("give at most {}", limit));
+    }
   }
 }
 

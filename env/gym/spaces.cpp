@@ -22,7 +22,7 @@ Space MakeObservationSpace() {
   constexpr double kJoint_rad = 7.0;
   constexpr double kJointSpeed_rad_s = 1000.0;
   constexpr double kReach_m = 2.0;
-  Space space{"observation", {}};
+  Space space{"observation", {}, {}};
   Add(space, {"q.0", "q.1", "q.2", "q.3", "q.4", "q.5"}, "rad", -kJoint_rad, kJoint_rad);
   Add(space, {"qd.0", "qd.1", "qd.2", "qd.3", "qd.4", "qd.5"}, "rad/s", -kJointSpeed_rad_s, kJointSpeed_rad_s);
   Add(space, {"tool.x", "tool.y", "tool.z"}, "m", -kReach_m, kReach_m);
@@ -41,12 +41,29 @@ Eigen::Vector3d Three(std::span<const double> v, std::size_t at) { return {v[at]
 
 }  // namespace
 
+namespace {
+
+constexpr double kLeastLength = 1e-6;
+
+bool Within(const SpaceComponent& c, double value) {
+  return std::isfinite(value) && value >= c.low && value <= c.high && !(c.whole && value != std::floor(value));
+}
+
+double Length(std::span<const double> values, const Space::Direction& direction) {
+  double sum = 0;
+  for (const double value : values.subspan(direction.first, direction.count)) sum += value * value;
+  return std::sqrt(sum);
+}
+
+}  // namespace
+
 bool Space::Contains(std::span<const double> values) const {
   if (values.size() != components.size()) return false;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i]) || values[i] < components[i].low || values[i] > components[i].high) return false;
+    if (!Within(components[i], values[i])) return false;
   }
-  return true;
+  return std::all_of(directions.begin(), directions.end(),
+                     [&](const Direction& direction) { return Length(values, direction) >= kLeastLength; });
 }
 
 void Space::Require(std::span<const double> values) const {
@@ -55,9 +72,16 @@ void Space::Require(std::span<const double> values) const {
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
     const SpaceComponent& c = components[i];
-    if (std::isfinite(values[i]) && values[i] >= c.low && values[i] <= c.high) continue;
+    if (Within(c, values[i])) continue;
     throw InputError(name, fmt::format("{} is {}", c.name, values[i]),
-                     fmt::format("give {} to {} {}", c.low, c.high, c.unit));
+                     fmt::format("give {} to {} {}{}", c.low, c.high, c.unit, c.whole ? ", a whole number" : ""));
+  }
+  for (const Direction& direction : directions) {
+    if (Length(values, direction) >= kLeastLength) continue;
+    throw InputError(
+        name,
+        fmt::format("{} and what follows has length {}", components[direction.first].name, Length(values, direction)),
+        "give a direction");
   }
 }
 
@@ -90,31 +114,39 @@ void Flatten(const Observation& o, std::span<double> values) {
 
 Space ActionSpace(ActionKind kind, const ActionBounds& bounds, double time_limit_s) {
   constexpr double kReach_m = 2.0;
-  Space space{std::string(ToString(kind)), {}};
+  // Zero is no speed, force, way or time to act with.
+  constexpr double kLeastSpeed_m_s = 1e-5;
+  constexpr double kLeastForce_n = 1e-3;
+  constexpr double kLeastDistance_m = 1e-6;
+  constexpr double kLeastTime_s = 1e-3;
+  Space space{std::string(ToString(kind)), {}, {}};
   switch (kind) {
     case ActionKind::kGuardedMove:
       Add(space, {"direction.x", "direction.y", "direction.z"}, "1", -1.0, 1.0);
       Add(space, {"distance"}, "m", 0.0, bounds.distance_m);
-      Add(space, {"speed"}, "m/s", 0.0, bounds.speed_m_s);
-      Add(space, {"contact_force"}, "N", 0.0, bounds.force_n);
+      Add(space, {"speed"}, "m/s", kLeastSpeed_m_s, bounds.speed_m_s);
+      Add(space, {"contact_force"}, "N", kLeastForce_n, bounds.force_n);
+      space.directions = {{0, 3}};
       break;
     case ActionKind::kTransfer:
       Add(space, {"x", "y", "z"}, "m", -kReach_m, kReach_m);
       Add(space, {"qw", "qx", "qy", "qz"}, "1", -1.0, 1.0);
       Add(space, {"straight"}, "1", 0.0, 1.0);
-      Add(space, {"speed"}, "m/s", 0.0, bounds.speed_m_s);
-      Add(space, {"contact_force"}, "N", 0.0, bounds.force_n);
+      Add(space, {"speed"}, "m/s", kLeastSpeed_m_s, bounds.speed_m_s);
+      Add(space, {"contact_force"}, "N", kLeastForce_n, bounds.force_n);
+      space.directions = {{3, 4}};
       break;
     case ActionKind::kInsert:
-      Add(space, {"distance"}, "m", 0.0, bounds.distance_m);
-      Add(space, {"speed"}, "m/s", 0.0, bounds.speed_m_s);
-      Add(space, {"force_limit"}, "N", 0.0, bounds.force_n);
-      Add(space, {"time_limit"}, "s", 0.0, time_limit_s);
+      Add(space, {"distance"}, "m", kLeastDistance_m, bounds.distance_m);
+      Add(space, {"speed"}, "m/s", kLeastSpeed_m_s, bounds.speed_m_s);
+      Add(space, {"force_limit"}, "N", kLeastForce_n, bounds.force_n);
+      Add(space, {"time_limit"}, "s", kLeastTime_s, time_limit_s);
       break;
     case ActionKind::kLowLevel:
       Add(space, {"dx", "dy", "dz"}, "m", -bounds.delta_m, bounds.delta_m);
       Add(space, {"rx", "ry", "rz"}, "rad", -bounds.delta_rad, bounds.delta_rad);
       Add(space, {"steps"}, "1", 1.0, bounds.steps);
+      space.components.back().whole = true;
       break;
   }
   return space;
@@ -125,7 +157,7 @@ Action DecodeAction(const Space& space, ActionKind kind, std::span<const double>
   switch (kind) {
     case ActionKind::kGuardedMove: {
       GuardedMoveAction action;
-      action.motion.direction = Three(v, 0);
+      action.motion.direction = Three(v, 0).normalized();
       action.motion.distance_m = v[3];
       action.motion.speed_m_s = v[4];
       action.motion.contact_force_n = v[5];
@@ -133,11 +165,8 @@ Action DecodeAction(const Space& space, ActionKind kind, std::span<const double>
     }
     case ActionKind::kTransfer: {
       const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
-      if (std::abs(q.norm() - 1.0) > 1e-3) {
-        throw InputError(space.name, fmt::format("the quaternion has length {}", q.norm()), "give one of length 1");
-      }
       TransferAction action;
-      action.world_T_tool = MakePose(Three(v, 0), q);
+      action.world_T_tool = MakePose(Three(v, 0), q.normalized());
       action.straight = v[7] >= 0.5;
       action.speed_m_s = v[8];
       action.contact_force_n = v[9];
@@ -155,7 +184,7 @@ Action DecodeAction(const Space& space, ActionKind kind, std::span<const double>
   }
   LowLevelAction action;
   action.delta << Three(v, 0), Three(v, 3);
-  action.steps = static_cast<int>(std::lround(v[6]));
+  action.steps = static_cast<int>(v[6]);
   return action;
 }
 

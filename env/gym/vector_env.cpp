@@ -21,6 +21,11 @@ struct VectorEnv::Slot {
   Slot(int number, std::shared_ptr<const Scene> scene, const EnvOptions& options)
       : index(number), env(std::move(scene), options) {}
 
+  void Fail(const char* what, bool input) {
+    failure = what;
+    input_error = input;
+  }
+
   int index;
   InsertionEnv env;
   std::uint64_t episodes = 0;
@@ -29,7 +34,8 @@ struct VectorEnv::Slot {
   bool over = false;                    ///< the episode; next-step mode then resets at the next action
   Action action;
   Info info, final_info;
-  std::exception_ptr error;
+  std::string failure;         ///< of the last step; names the environment
+  bool input_error = true;     ///< what kind of error it was
   State state = State::kIdle;  ///< guarded by the pool's mutex
 };
 
@@ -69,6 +75,17 @@ class VectorEnv::Pool {
         RunNext(lock);
       }
     }
+  }
+
+  /// Takes one slot that is done and failed, if there is one.
+  Slot* CollectFailed(const std::vector<std::unique_ptr<Slot>>& slots) {
+    const std::lock_guard lock(mutex_);
+    for (const auto& slot : slots) {
+      if (slot->state != Slot::State::kDone || slot->failure.empty()) continue;
+      slot->state = Slot::State::kIdle;
+      return slot.get();
+    }
+    return nullptr;
   }
 
   /// Takes the slots that are done, in the order of their numbers.
@@ -171,8 +188,9 @@ void VectorEnv::Begin(Slot& slot, StepResult& result) {
   ResetOptions episode = options_.episode;
   episode.episode = slot.first + slot.episodes * slot.stride;
   ++slot.episodes;
-  slot.over = false;
+  slot.over = true;  // until there is an episode: after a reset that failed the next one is tried
   result = slot.env.Reset(slot.seed, episode);
+  slot.over = false;
 }
 
 void VectorEnv::Publish(Slot& slot, const StepResult& result) {
@@ -186,7 +204,7 @@ void VectorEnv::Publish(Slot& slot, const StepResult& result) {
 
 // On a thread of the pool. Touches nothing but the slot and its rows.
 void VectorEnv::Run(Slot& slot) {
-  slot.error = nullptr;
+  slot.failure.clear();
   try {
     StepResult result;
     if (slot.over && options_.auto_reset == AutoResetMode::kNextStep) {
@@ -196,30 +214,49 @@ void VectorEnv::Run(Slot& slot) {
     }
     result = slot.env.Step(slot.action);
     slot.over = result.terminated || result.truncated;
-    if (slot.over) {
-      Flatten(result.observation, Row(final_observations_, slot.index));
-      slot.final_info = result.info;
-    }
-    if (slot.over && options_.auto_reset == AutoResetMode::kSameStep) {
-      StepResult first;
-      Begin(slot, first);
-      result.observation = first.observation;
-      result.info = first.info;
-    }
+    Publish(slot, result);  // whatever becomes of the reset
+    if (!slot.over) return;
+    Flatten(result.observation, Row(final_observations_, slot.index));
+    slot.final_info = result.info;
+    if (options_.auto_reset != AutoResetMode::kSameStep) return;
+    StepResult first;
+    Begin(slot, first);
+    result.observation = first.observation;
+    result.info = first.info;
     Publish(slot, result);
-  } catch (...) {
-    slot.error = std::current_exception();
+  } catch (const InputError& error) {
+    slot.Fail(error.what(), true);
+  } catch (const std::exception& error) {
+    slot.Fail(error.what(), false);
   }
+}
+
+void VectorEnv::ThrowFailure(const Slot& slot, std::size_t others) const {
+  const std::string what = slot.failure + (others == 0 ? "" : fmt::format("; and {} more environments failed", others));
+  const std::string where = fmt::format("environment {}", slot.index);
+  if (slot.input_error) throw InputError(where, what, "mend that one: the others go on");
+  throw WorldError(where, what, "reset that one: the others go on");
 }
 
 void VectorEnv::BeginAll() {
   reset_ = true;
+  std::vector<const Slot*> failed;
   for (const auto& slot : slots_) {
     slot->episodes = 0;
-    StepResult result;
-    Begin(*slot, result);
-    Publish(*slot, result);
+    slot->failure.clear();
+    try {
+      StepResult result;
+      Begin(*slot, result);
+      Publish(*slot, result);
+    } catch (const InputError& error) {
+      slot->Fail(error.what(), true);
+      failed.push_back(slot.get());
+    } catch (const std::exception& error) {
+      slot->Fail(error.what(), false);
+      failed.push_back(slot.get());
+    }
   }
+  if (!failed.empty()) ThrowFailure(*failed.front(), failed.size() - 1);
 }
 
 void VectorEnv::Reset(std::uint64_t seed) {
@@ -286,12 +323,8 @@ VectorEnv::Slot& VectorEnv::Idle(int environment) {
 }
 
 void VectorEnv::RequireWelcome(const Slot& slot, const Action& action) const {
-  try {
-    if (slot.over && options_.auto_reset == AutoResetMode::kNextStep) return;
-    slot.env.RequireWelcome(action);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("environment {}", slot.index), error.what(), "see the message of the environment");
-  }
+  if (slot.over && options_.auto_reset == AutoResetMode::kNextStep) return;
+  slot.env.RequireWelcome(action);
 }
 
 void VectorEnv::Step(std::span<const Action> actions) {
@@ -299,23 +332,38 @@ void VectorEnv::Step(std::span<const Action> actions) {
     throw InputError("vector environment", fmt::format("{} actions for {} environments", actions.size(), slots_.size()),
                      "give one each");
   }
-  std::vector<Slot*> all;
+  for (int i = 0; i < size(); ++i) Idle(i);
+  std::vector<Slot*> welcome;
   for (std::size_t i = 0; i < slots_.size(); ++i) {
-    RequireWelcome(Idle(static_cast<int>(i)), actions[i]);
-    all.push_back(slots_[i].get());
+    Slot& slot = *slots_[i];
+    slot.failure.clear();
+    try {
+      RequireWelcome(slot, actions[i]);
+      slot.action = actions[i];
+      welcome.push_back(&slot);
+    } catch (const InputError& error) {
+      slot.Fail(error.what(), true);
+    }
   }
-  for (std::size_t i = 0; i < slots_.size(); ++i) slots_[i]->action = actions[i];
-  pool_->Post(all);
-  pool_->Wait(all.size());
-  pool_->Collect(slots_);
-  for (const Slot* slot : all) {
-    if (slot->error) std::rethrow_exception(slot->error);
+  if (!welcome.empty()) {
+    pool_->Post(welcome);
+    pool_->Wait(welcome.size());
+    pool_->Collect(slots_);
   }
+  std::vector<const Slot*> failed;
+  for (const auto& slot : slots_) {
+    if (!slot->failure.empty()) failed.push_back(slot.get());
+  }
+  if (!failed.empty()) ThrowFailure(*failed.front(), failed.size() - 1);
 }
 
 void VectorEnv::Send(int environment, const Action& action) {
   Slot& slot = Idle(environment);
-  RequireWelcome(slot, action);
+  try {
+    RequireWelcome(slot, action);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("environment {}", environment), error.what(), "see the message of the environment");
+  }
   slot.action = action;
   Slot* one = &slot;
   pool_->Post({&one, 1});
@@ -326,14 +374,14 @@ std::vector<int> VectorEnv::Receive(int count) {
   const std::size_t done = pool_->Finished(slots_);
   const auto wanted = static_cast<std::size_t>(std::max(count, 1));
   if (wanted > done) pool_->Wait(wanted - done);
+  if (const Slot* failed = pool_->CollectFailed(slots_)) ThrowFailure(*failed, 0);
   std::vector<int> environments;
-  std::exception_ptr error;
-  for (const Slot* slot : pool_->Collect(slots_)) {
-    environments.push_back(slot->index);
-    if (slot->error) error = slot->error;
-  }
-  if (error) std::rethrow_exception(error);
+  for (const Slot* slot : pool_->Collect(slots_)) environments.push_back(slot->index);
   return environments;
+}
+
+const std::string& VectorEnv::failure(int environment) const {
+  return slots_.at(static_cast<std::size_t>(environment))->failure;
 }
 
 int VectorEnv::size() const { return static_cast<int>(slots_.size()); }

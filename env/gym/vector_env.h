@@ -39,7 +39,7 @@ struct VectorEnvOptions {
 ///
 /// Laws: environment i does what an InsertionEnv does with the same seeds, bit for bit, whatever the number of threads,
 /// the other environments and the order of completion. An action that is not valid throws InputError naming the
-/// environment and changes nothing, neither in it nor in the others; everything stays usable.
+/// environment and changes nothing in it, and does not keep the others from theirs; everything stays usable.
 ///
 /// One caller at a time.
 class VectorEnv {
@@ -63,15 +63,21 @@ class VectorEnv {
   /// Of every reset from now on; the episode number in it is ignored. Waits for all that was sent.
   void SetEpisodeOptions(const ResetOptions& episode);
 
-  /// One action per environment, in order. Throws InputError when an environment is busy or an action is refused; then
-  /// none was carried out.
+  /// One action per environment, in order. Throws InputError, with nothing done, when one is busy or the number of
+  /// actions is wrong. Actions that are refused, and resets that fail, do not block the others: those are carried out
+  /// and published, then InputError names the environments that did not follow (`failure`).
   void Step(std::span<const Action> actions);
 
   /// Starts an action on an idle environment and returns at once.
   void Send(int environment, const Action& action);
   /// Waits until at least `count` sent actions are done, or all of them; the environments that are done, ascending,
-  /// each reported once. Throws InputError when nothing was sent.
+  /// each reported once. Throws InputError when nothing was sent, and for the first one that failed (its reset, for
+  /// example), naming it: it counts as reported by that; the others that are done are reported by the next call. The
+  /// step that ended an episode is published even where the reset after it fails.
   std::vector<int> Receive(int count = 1);
+
+  /// What the last Step was refused or failed with, by environment; empty where it followed.
+  const std::string& failure(int environment) const;
 
   int size() const;
   AutoResetMode auto_reset() const;
@@ -100,6 +106,7 @@ class VectorEnv {
   void Run(Slot& slot);
   void Publish(Slot& slot, const StepResult& result);
   Slot& Idle(int environment);
+  [[noreturn]] void ThrowFailure(const Slot& slot, std::size_t others) const;
   void RequireWelcome(const Slot& slot, const Action& action) const;
 
   VectorEnvOptions options_;

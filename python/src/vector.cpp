@@ -56,7 +56,12 @@ class Vector {
     }
     actions_.resize(n_);
     for (std::size_t i = 0; i < n_; ++i) actions_[i] = DecodeFor(i, values.subspan(i * size, size));
-    vector_.Step(actions_);
+    try {
+      vector_.Step(actions_);
+    } catch (const Error&) {
+      if (AnyFailed()) TakeWhatFollowed();
+      throw;
+    }
     for (std::size_t i = 0; i < n_; ++i) Take(i);
   }
 
@@ -100,6 +105,19 @@ class Vector {
       return Decode(codec_, values, vector_.environment(static_cast<int>(i)));
     } catch (const InputError& error) {
       throw InputError("environment " + std::to_string(i), error.what());
+    }
+  }
+
+  bool AnyFailed() const {
+    for (std::size_t i = 0; i < n_; ++i) {
+      if (!vector_.failure(static_cast<int>(i)).empty()) return true;
+    }
+    return false;
+  }
+  /// One environment that does not follow does not keep the others from theirs.
+  void TakeWhatFollowed() {
+    for (std::size_t i = 0; i < n_; ++i) {
+      if (vector_.failure(static_cast<int>(i)).empty()) Take(i);
     }
   }
 

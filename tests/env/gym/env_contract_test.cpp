@@ -171,7 +171,10 @@ TEST_P(EnvContract, BadActionsAreRefusedAndChangeNothing) {
        {ActionKind::kGuardedMove, ActionKind::kTransfer, ActionKind::kInsert, ActionKind::kLowLevel}) {
     const Space space = ActionSpace(kind);
     std::vector<double> good;
-    for (const SpaceComponent& c : space.components) good.push_back(0.5 * (c.low + c.high));
+    for (const SpaceComponent& c : space.components) {
+      const double middle = 0.5 * (c.low + c.high);
+      good.push_back(c.whole ? std::floor(middle) : middle);
+    }
     if (kind == ActionKind::kGuardedMove) good[0] = 1.0;
     if (kind == ActionKind::kTransfer) good[3] = 1.0;
     EXPECT_TRUE(space.Contains(good));

@@ -1,12 +1,17 @@
 // Laws of VectorEnv: environment i does what an InsertionEnv alone does with the same keys, bit for bit, for any number
 // of threads, by Step or by Send and Receive in any order; the three modes of auto-reset differ only in when the next
-// episode begins, and the last observation of an episode is kept; a refused action changes nothing anywhere.
+// episode begins, and the last observation of an episode is kept; a refused action changes nothing in its
+// environment and does not keep the others from theirs; an auto-reset that fails is named, after the step that ended
+// the episode is published, and every environment is reported once.
 
 #include "feeler/env/gym/vector_env.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "feeler/core/error.h"
@@ -157,31 +162,77 @@ TEST(VectorEnv, ModesOfAutoReset) {
   }
 }
 
-TEST(VectorEnv, RefusedActionsChangeNothingAnywhere) {
+LowLevelAction Bad() {
+  LowLevelAction bad;
+  bad.delta[2] = std::nan("");
+  return bad;
+}
+
+TEST(VectorEnv, ARefusedActionDoesNotKeepTheOthersFromTheirs) {
   VectorEnv envs(PlugScene(), Options(2));
   EXPECT_THROW(envs.Send(0, Move(0, 0)), InputError);  // before the first reset
   envs.Reset(3);
-  const std::vector<double> before(envs.observations().begin(), envs.observations().end());
+  const std::vector<double> before = Row(envs, 4);
   std::vector<Action> actions;
   for (int i = 0; i < kEnvironments; ++i) actions.push_back(Move(i, 0));
-  LowLevelAction bad;
-  bad.delta[2] = std::nan("");
-  actions.back() = bad;
+  actions.back() = Bad();
   try {
     envs.Step(actions);
     ADD_FAILURE() << "accepted";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("environment 4"), std::string::npos) << error.what();
   }
+  EXPECT_EQ(Row(envs, 4), before);
+  EXPECT_EQ(envs.environment(4).robot().Time(), 0.0);
+  EXPECT_FALSE(envs.failure(4).empty());
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_GT(envs.environment(i).robot().Time(), 0.0) << i;
+    EXPECT_TRUE(envs.failure(i).empty());
+  }
   EXPECT_THROW(envs.Step(std::vector<Action>(2, Move(0, 0))), InputError);
   EXPECT_THROW(envs.Send(kEnvironments, Move(0, 0)), InputError);
-  EXPECT_EQ(std::vector<double>(envs.observations().begin(), envs.observations().end()), before);
-  for (int i = 0; i < kEnvironments; ++i) EXPECT_EQ(envs.environment(i).robot().Time(), 0.0);
   actions.back() = Move(kEnvironments - 1, 0);
   EXPECT_NO_THROW(envs.Step(actions));
+  EXPECT_TRUE(envs.failure(4).empty());
   VectorEnvOptions none = Options(1);
   none.environments = 0;
   EXPECT_THROW(VectorEnv(PlugScene(), none), InputError);
+}
+
+TEST(VectorEnv, AnAutoResetThatFailsNamesItsEnvironmentOnce) {
+  VectorEnvOptions options = Options(2, AutoResetMode::kSameStep);
+  options.env.limits = InsertionLimits{};
+  options.env.limits->time_s = 0.05;  // every step ends its episode
+  VectorEnv envs(PlugScene(), options);
+  envs.Reset(1);
+  envs.Send(0, Move(0, 0));
+  envs.Send(1, Move(1, 0));
+  ResetOptions out_of_reach;
+  Pose far = PlugScene()->task.world_T_target;
+  far.translation().x() += 3.0;
+  out_of_reach.world_T_estimate = far;
+  envs.SetEpisodeOptions(out_of_reach);  // waits for 0 and 1: their next episodes have begun
+  for (int i = 2; i < kEnvironments; ++i) envs.Send(i, Move(i, 0));
+  std::multiset<int> reported;
+  std::set<int> failed;
+  while (static_cast<int>(reported.size()) < kEnvironments) {
+    try {
+      for (const int i : envs.Receive(kEnvironments)) reported.insert(i);
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      ASSERT_EQ(what.find("environment "), 0U) << what;
+      const int i = std::stoi(what.substr(12));
+      failed.insert(i);
+      reported.insert(i);
+    }
+  }
+  EXPECT_EQ(failed, (std::set<int>{2, 3, 4}));
+  for (int i = 0; i < kEnvironments; ++i) {
+    EXPECT_EQ(reported.count(i), 1U) << i;
+    EXPECT_TRUE(envs.truncated()[static_cast<std::size_t>(i)]) << i;  // the step that ended the episode
+    EXPECT_EQ(envs.failure(i).empty(), i < 2) << i;
+  }
+  EXPECT_THROW(envs.Receive(), InputError);  // nothing is left
 }
 
 }  // namespace
