@@ -7,10 +7,12 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import _feeler
+from .errors import one_sentence
 from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task
 from .results import Result, fields
 
 
+@one_sentence
 class Database:
     """The policies of a problem family for one task, in one SQLite file, read only.
 
@@ -75,6 +77,7 @@ class Database:
         return fields(self._core.verify(self.task._core, jobs, cancellation, progress))
 
 
+@one_sentence
 def preprocess(
     task: Task | str,
     out: str | os.PathLike[str],

@@ -224,6 +224,8 @@ class InsertionEnv(gymnasium.Env[Any, Any]):
 
     def restore(self, state: Any) -> None:
         """Goes on from a saved state, bit for bit. Raises InputError for the state of another model."""
+        if not (isinstance(state, tuple) and len(state) == 5 and isinstance(state[0], _feeler.EnvironmentState)):
+            raise input_error("state", f"is of type {type(state).__name__}", "give what save() returned")
         core_state, seed, episode, options, generator = state
         self.core.restore(core_state)
         self._seed, self._episode, self._options = seed, episode, dict(options)

@@ -9,8 +9,8 @@ from typing import Any
 
 from . import _feeler
 from .database import Database
-from .errors import input_error
-from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task
+from .errors import input_error, one_sentence
+from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task, require_policy_for
 from .policy import Policy
 from .results import Result, fields
 
@@ -52,6 +52,21 @@ def fault_names() -> dict[str, str]:
     return _feeler.fault_names()
 
 
+def given_policy(policy: Any, task: Task, extents: Extents | None) -> Any:
+    """What the library is given for a policy of episodes. Raises InputError for none, and for a graph of another problem."""
+    if not isinstance(policy, str | Policy | PolicyGraph):
+        raise input_error(
+            "policy", f"is of type {type(policy).__name__}", "give a name, a feeler.Policy or a PolicyGraph"
+        )
+    if not isinstance(policy, PolicyGraph):
+        return policy
+    if extents is None:
+        raise input_error("extents", "missing", "give those that the policy is for")
+    require_policy_for(policy, task, extents)
+    return policy._core
+
+
+@one_sentence
 def run(
     task: Task | str | os.PathLike[str] = "plug",
     policy: str | Policy | PolicyGraph = "database",
@@ -95,13 +110,7 @@ def run(
     loaded = as_task(task)
     if isinstance(database, str | os.PathLike):
         database = Database(database)
-    given: Any = policy._core if isinstance(policy, PolicyGraph) else policy
-    if isinstance(policy, PolicyGraph) and extents is None:
-        raise input_error("extents", "missing", "give those that the policy is for")
-    if not isinstance(policy, str | Policy | PolicyGraph):
-        raise input_error(
-            "policy", f"is of type {type(policy).__name__}", "give a name, a feeler.Policy or a PolicyGraph"
-        )
+    given = given_policy(policy, loaded, extents)
     options = (
         [f"{k}={v}" for k, v in policy_options.items()] if isinstance(policy_options, dict) else list(policy_options)
     )

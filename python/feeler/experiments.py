@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .errors import input_error
+from .errors import input_error, one_sentence
 from .planner import Progress
 from .results import Result, fields
 
@@ -35,6 +35,7 @@ def experiments() -> dict[str, str]:
     return _module().experiments()
 
 
+@one_sentence
 def experiment(
     name: str,
     out: str | os.PathLike[str],
@@ -63,6 +64,7 @@ def experiment(
     return answer
 
 
+@one_sentence
 def report(folder: str | os.PathLike[str], out: str | os.PathLike[str], replay_megabytes: float = 12.0) -> Result:
     """Writes one self-contained page of a folder of results: ``experiments``, ``episodes``, ``faults``, ``bytes``, ``path``."""
     return fields(_module().report(os.fspath(folder), os.fspath(out), replay_megabytes))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from . import __version__, _feeler
 from .database import Database
-from .errors import input_error
+from .episodes import given_policy
+from .errors import input_error, one_sentence
 from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task
 from .policy import Policy
 from .results import Result
@@ -82,6 +83,7 @@ def _left(track: dict[str, Any], begun_s: float) -> NDArray[np.int64]:
     return left
 
 
+@one_sentence
 def record(
     task: Task | str = "plug",
     policy: str | PolicyGraph | Policy = "database",
@@ -102,7 +104,7 @@ def record(
     loaded = as_task(task)
     if isinstance(database, str | os.PathLike):
         database = Database(database)
-    given: Any = policy._core if isinstance(policy, PolicyGraph) else policy
+    given = given_policy(policy, loaded, extents)
     tracks = _feeler.record_tracks(
         loaded._core, given, None if database is None else database._core, first, episodes, seed, extents, noise,
         control_steps, cancellation, progress,
@@ -153,6 +155,7 @@ def record(
     return Demonstrations(**joined, starts=np.array(starts), records=records, settings=settings)
 
 
+@one_sentence
 def export_episodes(
     out: str | os.PathLike[str], task: Task | str = "plug", policy: str | PolicyGraph | Policy = "database", *,
     format: str = "npz", **how: Any,

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _feeler
-from .errors import input_error
+from .errors import input_error, one_sentence
 from .planner import Task, as_task
 from .results import Result, fields
 
 
+@one_sentence
 class PosePerception:
     """Finds the target of a task. Make it once: it samples the surfaces of the target.
 

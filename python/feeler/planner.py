@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _feeler
 from ._feeler import Cancellation
-from .errors import input_error
+from .errors import input_error, one_sentence
 from .results import Result, fields
 
 Extents = str | Sequence[int]
@@ -25,6 +25,7 @@ def list_tasks() -> list[str]:
     return _feeler.list_tasks()
 
 
+@one_sentence
 class ContactMap:
     """How far the tool can travel, in each direction, from each displacement relative to the target before contact.
 
@@ -70,6 +71,7 @@ class ContactMap:
         return self._core.blocked(orientation)
 
 
+@one_sentence
 class Problem:
     """A start belief and everything needed to plan from it."""
 
@@ -120,6 +122,7 @@ class Problem:
         return {outcome: np.array(which, dtype=np.int64) for outcome, which in sorted(answers.items())}
 
 
+@one_sentence
 class PolicyGraph:
     """What to do after each history of moves and outcomes: an acyclic graph from a start belief to its leaves."""
 
@@ -157,8 +160,8 @@ class PolicyGraph:
         """The nodes that are passed if this hypothesis is true, root to leaf, each with the ``outcome`` it met (None at the
         leaf): a belief as it shrinks."""
         nodes, problem = self.nodes(), self.problem
-        if not 0 <= hypothesis < len(problem.hypotheses):
-            raise input_error("hypothesis", f"{hypothesis} of {len(problem.hypotheses)}", "count from 0")
+        if not isinstance(hypothesis, int | np.integer) or not 0 <= hypothesis < len(problem.hypotheses):
+            raise input_error("hypothesis", f"{hypothesis!r} of {len(problem.hypotheses)}", "count from 0")
         path, at = [], 0
         while True:
             node = Result(nodes[at], outcome=None)
@@ -197,6 +200,7 @@ class PolicyGraph:
         return graph
 
 
+@one_sentence
 class Task:
     """What is inserted into what: the numbers of a task file, and what planning needs of its geometry.
 
@@ -287,6 +291,7 @@ def as_task(task: Task | str | os.PathLike[str], **how: Any) -> Task:
     return Task(task, **how)
 
 
+@one_sentence
 def contact_map(
     task: Task | str, opening: str | None = None, jobs: int = 1, progress: Progress | None = None
 ) -> ContactMap:
@@ -294,6 +299,7 @@ def contact_map(
     return as_task(task, opening=opening).contact_map(jobs, progress)
 
 
+@one_sentence
 def solve(
     task: Task | Problem | str | os.PathLike[str],
     extents: Extents | None = None,
@@ -339,6 +345,17 @@ def solve(
     result = fields(answer)
     result.policy = None if policy is None else PolicyGraph(policy, problem._unit, problem._task)
     return result
+
+
+def require_policy_for(policy: PolicyGraph, task: Task, extents: Extents) -> None:
+    """Raises InputError unless the policy was made for these hypotheses."""
+    given, own = task.problem(extents)._core, policy._core.problem
+    if not (np.array_equal(given.hypotheses, own.hypotheses) and np.array_equal(given.start, own.start)):
+        raise input_error(
+            "extents",
+            f"make another problem ({given.name}) than the policy is for ({own.name})",
+            "give those of the policy",
+        )
 
 
 def evaluate(policy: PolicyGraph) -> Result:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _feeler
 from ._feeler import CameraView, MotionResult
-from .errors import input_error
-from .planner import Extents, PolicyGraph, Task, as_task
+from .errors import input_error, one_sentence
+from .planner import Extents, PolicyGraph, Task, as_task, require_policy_for
 from .policy import Policy
 from .results import Result, fields
 
@@ -157,6 +157,7 @@ class ForwardingRobot(Robot):
         return self.robot.follow_twist(tool_T_frame, linear_m_s, angular_rad_s, duration_s, contact_force_n)
 
 
+@one_sentence
 def execute(
     task: Task | str,
     extents: Extents,
@@ -181,6 +182,7 @@ def execute(
     """
     loaded = as_task(task)
     if isinstance(policy, PolicyGraph):
+        require_policy_for(policy, loaded, extents)
         given: Any = policy._core
     elif isinstance(policy, Policy):
         given = policy._for_episode(0, 0)

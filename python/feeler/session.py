@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import queue
 import threading
+import weakref
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +17,16 @@ from .planner import Extents, PolicyGraph, Task
 from .policy import Policy
 from .results import Result
 from .robot import MotionResult, Robot, execute
+
+
+def _numbers(where: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise input_error(where, "is not of finite numbers", f"give {' x '.join(map(str, shape)) or 'one'}")
+    return array
 
 
 @dataclass(frozen=True)
@@ -94,6 +106,17 @@ class _Turned(Robot):
         )
 
 
+# What is open when the interpreter ends is closed first: a thread that it would cut off in the library takes the process
+# down with it.
+_OPEN: weakref.WeakSet[Session] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    for session in list(_OPEN):
+        session.close()
+
+
 class Session:
     """One execution, motion by motion::
 
@@ -118,7 +141,7 @@ class Session:
         ladder: bool = False,
         contact_force_n: float = 5.0,
     ) -> None:
-        self._robot = _Turned(np.asarray(pose, dtype=float))
+        self._robot = _Turned(_numbers("pose", pose, (4, 4)))
         self._pending: Motion | None = None
         self._verdict: Result | None = None
         self._error: BaseException | None = None
@@ -137,6 +160,7 @@ class Session:
 
         self._thread = threading.Thread(target=work, name="feeler session", daemon=True)
         self._thread.start()
+        _OPEN.add(self)
 
     def next(self, timeout_s: float | None = None) -> Motion | None:
         """The next motion, the same one until it was reported; None once there is a verdict. What was wrong with an argument
@@ -171,12 +195,12 @@ class Session:
                 raise input_error(
                     "report", f"the result is of type {type(result).__name__}", "give a feeler.MotionResult"
                 )
-            self._robot.pose = result.world_T_tool
             answer = result
-        if wrench is not None:
-            self._robot.wrench = np.asarray(wrench, dtype=float)
-        if time_s is not None:
-            self._robot.now_s = float(time_s)
+        seen = self._robot.wrench if wrench is None else _numbers("wrench", wrench, (6,))
+        now_s = self._robot.now_s if time_s is None else float(_numbers("time_s", time_s, ()))
+        self._robot.wrench, self._robot.now_s = seen, now_s
+        if result is not None:
+            self._robot.pose = result.world_T_tool
         self._pending = None
         self._robot.answers.put(answer)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _feeler, spaces
 from .environment import RENDER_MODES, check_cameras, check_task, core_options, scene_of
-from .errors import input_error
+from .errors import input_error, one_sentence
 
 _MODES = {
     AutoresetMode.NEXT_STEP: "next-step",
@@ -74,6 +74,8 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             )
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise input_error("num_envs", f"is {num_envs!r}", "give 1 or more")
+        if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int)):
+            raise input_error("threads", f"are {threads!r}", "give 1 or more")
         if isinstance(autoreset_mode, str):
             names = {name.replace("-", "_"): mode for mode, name in _MODES.items()}
             key = (
@@ -160,6 +162,7 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             infos[f"_{name}"] = mask.copy()
         return infos
 
+    @one_sentence
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -170,6 +173,8 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             options: those of :meth:`feeler.InsertionEnv.reset` but ``episode``, for all environments until others are given.
         """
         core = self.core
+        if options is not None and not isinstance(options, dict):
+            raise input_error("options", f"are of type {type(options).__name__}", "give a dict")
         options = dict(options or {})
         mask = options.pop("reset_mask", None)
         if mask is None:
@@ -208,7 +213,7 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if len(seeds) != self.num_envs:
             raise input_error("seed", f"{len(seeds)} seeds for {self.num_envs} environments", "give one each")
         for s in seeds:
-            if s is not None and not 0 <= s < 2**64:
+            if s is not None and (not isinstance(s, int | np.integer) or not 0 <= s < 2**64):
                 raise input_error("seed", f"is {s!r}", "give whole numbers from 0 to 2^64 - 1")
         return seeds
 
@@ -240,11 +245,13 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.core.step(spaces.as_action(actions, self._shape, "actions"))
         return self._answer()
 
+    @one_sentence
     def send(self, actions: Any, env_ids: Sequence[int] | None = None) -> None:
         """Starts an action in each of these idle environments (default: all) and returns at once."""
-        ids = list(range(self.num_envs)) if env_ids is None else [int(i) for i in env_ids]
+        ids = list(range(self.num_envs)) if env_ids is None else np.asarray(env_ids).tolist()
         self.core.send(ids, spaces.as_action(actions, (len(ids), *self._single_shape), "actions"))
 
+    @one_sentence
     def recv(self, count: int = 1) -> tuple[NDArray[np.int64], Any, Any, Any, Any]:
         """Waits until at least ``count`` sent actions are done: the environments, ascending, each reported once, and rows
         of observations (flat), rewards, terminated and truncated for them."""

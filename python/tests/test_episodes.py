@@ -4,6 +4,9 @@ policies in Python stand beside the others; what a callback raises comes out; th
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -165,6 +168,39 @@ def test_a_session_can_be_given_up_and_says_what_is_wrong(plug, graph):
         wrong.next(timeout_s=60)
 
 
+def test_a_graph_of_another_problem_is_refused(plug, graph, tmp_path):
+    env = feeler.InsertionEnv("plug")
+    env.reset(seed=4)
+    for call in (
+        lambda: feeler.run(plug, graph, extents=(3, 3, 2)),
+        lambda: feeler.export_episodes(tmp_path / "x", plug, graph, extents=(3, 3, 2)),
+        lambda: feeler.execute(plug, (3, 3, 2), np.eye(4), graph, feeler.ForwardingRobot(env.robot)),
+    ):
+        with pytest.raises(feeler.InputError, match="another problem"):
+            call()
+
+
+def test_reports_are_checked_and_an_open_session_ends_with_the_process(plug, graph):
+    with pytest.raises(feeler.InputError, match="pose"):
+        feeler.Session(plug, (3, 3, 3), np.eye(4), graph, pose=np.eye(3))
+    with feeler.Session(plug, (3, 3, 3), np.eye(4), graph, pose=np.eye(4)) as session:
+        motion = session.next(timeout_s=60)
+        result = MotionResult("reached", 0.0, False, 0.0, motion.arguments["world_T_tool"])
+        for bad in ({"wrench": [1, 2]}, {"wrench": [np.nan] * 6}, {"time_s": "now"}):
+            with pytest.raises(feeler.InputError, match="finite"):
+                session.report(result, **bad)
+        assert session.next() is motion
+        session.report(result, wrench=np.zeros(6), time_s=1.0)
+    code = """
+import numpy as np, feeler
+policy = feeler.solve("plug", (2, 2, 2)).policy
+session = feeler.Session("plug", (2, 2, 2), np.eye(4), policy, pose=np.eye(4))
+print(session.next(timeout_s=60).kind)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "transfer\n", "")
+
+
 def test_frames_and_files(database, tmp_path):
     run = feeler.run("plug", database=database, episodes=2)
     run.save(tmp_path / "run.jsonl")
@@ -186,6 +222,8 @@ def test_frames_and_files(database, tmp_path):
         ({"policy": 3}, "type int"),
         ({"policy": "spiral", "episodes": 0}, "episodes"),
         ({"policy": "spiral", "jobs": -1}, "jobs"),
+        ({"policy": "spiral", "seed": 1.5}, "seed: float"),
+        ({"policy": "spiral", "ladder": "high"}, "ladder: str"),
         ({"policy": "spiral", "noise": "earthquake"}, "earthquake"),
         ({"policy": "spiral", "placement": "moon"}, "moon"),
         ({"policy": "spiral", "policy_options": {"colour": "red"}}, "colour"),
