@@ -1,6 +1,6 @@
 """Whether resets and steps leave anything behind: growth of resident memory after a warm-up.
 
-v/bin/python python/bench/memory.py [--resets 10000] [--steps 1000000] [--environments 200]
+v/bin/python python/bench/memory.py [--resets 10000] [--steps 1000000] [--environments 200] [--limit-kb 2000]
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import gc
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -60,12 +61,14 @@ def environments(count: int) -> int:
     return growth(work, 20, count)
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--resets", type=int, default=10_000)
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--environments", type=int, default=200)
+    parser.add_argument("--limit-kb", type=float, help="exit with 1 where something grew by more")
     a = parser.parse_args()
+    largest = 0.0
     for name, work, count in (
         ("resets", resets, a.resets),
         ("control steps", steps, a.steps),
@@ -73,8 +76,10 @@ def main() -> None:
     ):
         start = time.process_time()
         grown = work(count)
+        largest = max(largest, grown / 1e3)
         print(f"{count:9d} {name}: {grown / 1e3:+.0f} kB, {time.process_time() - start:.0f} s of CPU", flush=True)
+    return 1 if a.limit_kb is not None and largest > a.limit_kb else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -39,6 +39,8 @@ class PosePerception:
             with a table ``world_T_estimate`` (the centre of the hypotheses), ``counts`` and ``extents``, those of the
             smallest problem of the table's family that covers them.
         """
+        if isinstance(camera, dict) and 0 in (camera.get("fx"), camera.get("fy")):
+            raise input_error("camera", "fx or fy is 0", "give focal lengths in pixels")
         behind = None if background is None else _picture(background, "background")
         return fields(self._core.in_depth(_picture(image, "depth"), camera, behind))
 

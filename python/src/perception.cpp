@@ -99,9 +99,6 @@ void BindPerception(nb::module_& m) {
             intrinsics.fy = number("fy");
             intrinsics.cx = number("cx");
             intrinsics.cy = number("cy");
-            if (intrinsics.fx <= 0.0 || intrinsics.fy <= 0.0) {
-              throw InputError("camera", "fx and fy are not above 0", "give focal lengths in pixels");
-            }
             Eigen::Matrix4d pose;
             if (!camera.contains("world_T_camera") || !nb::try_cast(camera["world_T_camera"], pose)) {
               throw InputError("camera", "has no pose \"world_T_camera\"", "give a 4 x 4 pose");
