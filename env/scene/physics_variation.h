@@ -19,6 +19,11 @@ struct PhysicsVariation {
   /// the insertion axis.
   Eigen::Vector3d tool_slip_m = Eigen::Vector3d::Zero();
   double tool_turn_rad = 0.0;
+  /// The target gives way: it stands on springs of this stiffness (N/m) along every axis, by up to kPortTravel_m, and
+  /// stays where friction of kPortFriction_n holds it. 0: it stands fast.
+  double port_stiffness_n_m = 0.0;
+  static constexpr double kPortTravel_m = 1e-3;
+  static constexpr double kPortFriction_n = 2.0;
   bool operator==(const PhysicsVariation&) const = default;
   /// Throws InputError naming the number that makes no sense.
   void Validate() const;

@@ -87,6 +87,7 @@ void World::Reset(const JointVector& q_rad, const Pose& world_T_target, const Ph
   mj_resetData(model_.get(), data_.get());
   SetJointPositions(*scene_, q_rad, *data_);
   SetTargetPose(*scene_, world_T_target, *data_);
+  port_home_m_ = world_T_target.translation();
   UpdatePositions();
   tool_at_contact_ = ToolPose();
   CheckSound();
@@ -121,6 +122,7 @@ void World::Step(const JointVector& torque_nm) {
       !AllBelow(d->qpos, m->nq, kAbsurdVelocity)) {
     Fail(fmt::format("unstable physics at {:.3f} s", d->time));
   }
+  MovePort();
   UpdatePositions();
   CheckSound();
 }
@@ -144,6 +146,28 @@ void World::GatherContacts() {
     c.torque_nm = frame.transpose() * Eigen::Map<const Eigen::Vector3d>(force + 3);
     c.distance_m = contact.dist;
   }
+}
+
+void World::MovePort() {
+  if (variation_.port_stiffness_n_m == 0.0) return;
+  // Without mass, and slowed as grease does: the spring settles within 8 to 80 ms, and a contact cannot throw it about.
+  constexpr double kDrag_n_s_m = 400.0;
+  const auto of_target = [&](int geom) {
+    return model_->body_rootid[model_->geom_bodyid[geom]] == model_->body_rootid[scene_->target_body];
+  };
+  Eigen::Vector3d push = Eigen::Vector3d::Zero();
+  for (const ContactForce& c : contacts_) {
+    if (of_target(c.geom2)) push += c.force_n;
+    if (of_target(c.geom1)) push -= c.force_n;
+  }
+  Eigen::Map<Eigen::Vector3d> place_m(data_->mocap_pos + 3 * scene_->target_mocap);
+  Eigen::Vector3d offset = place_m - port_home_m_;
+  const Eigen::Vector3d net = push - variation_.port_stiffness_n_m * offset;
+  const double size = net.norm();
+  if (size <= PhysicsVariation::kPortFriction_n) return;
+  offset += timestep_s() / kDrag_n_s_m * (1.0 - PhysicsVariation::kPortFriction_n / size) * net;
+  offset *= std::min(1.0, PhysicsVariation::kPortTravel_m / std::max(offset.norm(), 1e-12));
+  place_m = port_home_m_ + offset;
 }
 
 void World::CheckSound() {
@@ -197,6 +221,7 @@ WorldState World::Save() const {
   s.tool_at_contact = tool_at_contact_;
   s.applied_torque_nm = applied_torque_;
   s.variation = variation_;
+  s.port_home_m = port_home_m_;
   s.model = fingerprint_;
   return s;
 }
@@ -222,6 +247,7 @@ void World::Restore(const WorldState& s) {
   std::copy(s.warmstart.begin(), s.warmstart.end(), data_->qacc_warmstart);
   std::copy(s.mocap_pos.begin(), s.mocap_pos.end(), data_->mocap_pos);
   std::copy(s.mocap_quat.begin(), s.mocap_quat.end(), data_->mocap_quat);
+  port_home_m_ = s.port_home_m;
   contacts_ = s.contacts;
   applied_torque_ = s.applied_torque_nm;
   UpdatePositions();

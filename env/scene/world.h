@@ -31,6 +31,7 @@ struct WorldState {
   Pose tool_at_contact = Pose::Identity();
   JointVector applied_torque_nm = JointVector::Zero();
   PhysicsVariation variation;
+  Eigen::Vector3d port_home_m = Eigen::Vector3d::Zero();
   std::uint64_t model = 0;  ///< fingerprint of the scene's model
 };
 
@@ -88,6 +89,8 @@ class World {
   void Vary(const PhysicsVariation& variation);
   void UpdatePositions();
   void GatherContacts();
+  /// Lets the target give way to what pushes it, where it stands on springs.
+  void MovePort();
   void CheckSound();
   [[noreturn]] void Fail(const std::string& what);
 
@@ -98,6 +101,7 @@ class World {
   Pose tool_at_contact_ = Pose::Identity();
   JointVector applied_torque_ = JointVector::Zero();
   PhysicsVariation variation_;
+  Eigen::Vector3d port_home_m_ = Eigen::Vector3d::Zero();  ///< of the target where nothing pushes it, world
   std::uint64_t fingerprint_ = 0;
   std::string failure_;
 };

@@ -57,6 +57,10 @@ void AddSlip(EpisodeFaults& n, double least_mm, double most_mm) {
   SetOnce(n.slip_m, "slip", 1e-3 * least_mm, 1e-3 * most_mm);
 }
 
+void AddPortStiffness(EpisodeFaults& n, double least_n_mm, double most_n_mm) {
+  SetOnce(n.port_stiffness_n_m, "port stiffness", 1e3 * least_n_mm, 1e3 * most_n_mm);
+}
+
 constexpr WorldNoise kWorldNoises[] = {
     {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
      [](EpisodeFaults& n) { AddOutside(n, 0.5, 4.0); }},
@@ -99,6 +103,8 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
      [](EpisodeFaults& n, double friction) { AddContactFriction(n, friction, friction); }},
     {"slip", "the tool has slipped in the gripper by so many mm across the insertion, and turned by 2 degrees a mm",
      0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
+    {"port-stiffness", "the target stands on springs of so many N/mm, gives way by up to 1 mm and may stay displaced",
+     1.0, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
 };
 
 /// Names with a range, "yaw=0..5": the value is drawn uniformly per episode.
@@ -114,7 +120,8 @@ constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw},
                                        {"force-noise", 0.0, 50.0, AddForceNoise},
                                        {"latency", 0.0, 50.0, AddLatency},
                                        {"contact-friction", 0.0, 5.0, AddContactFriction},
-                                       {"slip", 0.0, 5.0, AddSlip}};
+                                       {"slip", 0.0, 5.0, AddSlip},
+                                       {"port-stiffness", 1.0, 1e4, AddPortStiffness}};
 
 bool ReadNumber(const std::string& text, double& value) {
   std::istringstream number(text);
@@ -140,7 +147,8 @@ bool AddDrawn(const std::string& text, EpisodeFaults& noise) {
     return true;
   }
   throw InputError("noise", "'" + text + "': " + name + " takes no range",
-                   "yaw, outside, force-noise, latency, contact-friction and slip take one, FROM..TO; give a number");
+                   "yaw, outside, force-noise, latency, contact-friction, slip and port-stiffness take one, FROM..TO; "
+                   "give a number");
 }
 
 /// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.

@@ -130,7 +130,8 @@ TEST(DrawEpisode, RangesAreFilledAndKept) {
 
 TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
   const Task task = ThreeAxisTask();
-  const EpisodeFaults faults = ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6");
+  const EpisodeFaults faults =
+      ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6,port-stiffness=5..50");
   EXPECT_GE(faults.robot.contact_threshold_n, 40.0) << "a contact is told from the worst noise of the range";
   std::map<std::string, std::pair<double, double>> met;
   for (std::uint64_t k = 0; k < 200; ++k) {
@@ -139,6 +140,7 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
     EXPECT_DOUBLE_EQ(draw.robot.force_delay_s, 1e-3 * draw.values.at("latency"));
     EXPECT_EQ(draw.robot.force_noise_n, draw.values.at("force-noise"));
     EXPECT_NEAR(0.3 * draw.physics.contact_friction, draw.values.at("contact-friction"), 1e-12);
+    EXPECT_NEAR(1e-3 * draw.physics.port_stiffness_n_m, draw.values.at("port-stiffness"), 1e-9);
     EXPECT_NEAR(1e3 * draw.physics.tool_slip_m.norm(), draw.values.at("slip"), 1e-12);
     EXPECT_EQ(draw.physics.tool_slip_m[AxisOf(task.insertion)], 0.0);
     EXPECT_NEAR(std::abs(draw.physics.tool_turn_rad) * 180.0 / std::numbers::pi, 2.0 * draw.values.at("slip"), 1e-9);
@@ -149,8 +151,11 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
     // Every fault has a stream of its own.
     EXPECT_EQ(DrawWorld(task, ParseFaults("slip=0..1"), 0.3, 5, k).values.at("slip"), draw.values.at("slip"));
   }
-  const std::map<std::string, std::pair<double, double>> ranges = {
-      {"latency", {2.0, 8.0}}, {"contact-friction", {0.1, 0.6}}, {"slip", {0.0, 1.0}}, {"force-noise", {1.0, 6.0}}};
+  const std::map<std::string, std::pair<double, double>> ranges = {{"latency", {2.0, 8.0}},
+                                                                   {"contact-friction", {0.1, 0.6}},
+                                                                   {"slip", {0.0, 1.0}},
+                                                                   {"force-noise", {1.0, 6.0}},
+                                                                   {"port-stiffness", {5.0, 50.0}}};
   ASSERT_EQ(met.size(), ranges.size());
   for (const auto& [name, range] : ranges) {
     const double width = range.second - range.first;
