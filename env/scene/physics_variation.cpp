@@ -146,9 +146,9 @@ void PhysicsVariation::Validate() const {
     throw InputError("reset", "the tool has slipped by more than 50 mm or 1 rad, or by what is no number",
                      "give less, in metres and rad");
   }
-  if (!(port_stiffness_n_m == 0.0 || (port_stiffness_n_m >= 1e3 && port_stiffness_n_m <= 1e7))) {
+  if (!(port_stiffness_n_m == 0.0 || (port_stiffness_n_m >= 1e2 && port_stiffness_n_m <= 1e7))) {
     throw InputError("reset", fmt::format("the target stands on springs of {} N/m", port_stiffness_n_m),
-                     "give 1000 to 10000000, or 0 for a target that stands fast");
+                     "give 100 to 10000000, or 0 for a target that stands fast");
   }
   if (!std::isfinite(clearance_m)) throw InputError("reset", "the clearance is not finite", "give metres");
 }

@@ -104,7 +104,7 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
     {"slip", "the tool has slipped in the gripper by so many mm across the insertion, and turned by 2 degrees a mm",
      0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
     {"port-stiffness", "the target stands on springs of so many N/mm, gives way by up to 1 mm and may stay displaced",
-     1.0, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
+     0.1, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
 };
 
 /// Names with a range, "yaw=0..5": the value is drawn uniformly per episode.
@@ -121,7 +121,7 @@ constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw},
                                        {"latency", 0.0, 50.0, AddLatency},
                                        {"contact-friction", 0.0, 5.0, AddContactFriction},
                                        {"slip", 0.0, 5.0, AddSlip},
-                                       {"port-stiffness", 1.0, 1e4, AddPortStiffness}};
+                                       {"port-stiffness", 0.1, 1e4, AddPortStiffness}};
 
 bool ReadNumber(const std::string& text, double& value) {
   std::istringstream number(text);
