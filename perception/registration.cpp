@@ -118,9 +118,14 @@ std::vector<Candidate> Best(std::vector<Candidate> candidates, const Eigen::Matr
   return best;
 }
 
+struct ClusterFit {
+  Registration registration;
+  Contradiction contradiction;
+};
+
 /// The fit of one cluster. Fitness is zero where none is to be had.
-Registration RegisterCluster(const Points& cluster, const TargetModel& model, const Eigen::Matrix3d& orientation,
-                             const Eigen::Vector3d& eye_m, const RegistrationOptions& options, bool thorough) {
+ClusterFit RegisterCluster(const Points& cluster, const TargetModel& model, const Eigen::Matrix3d& orientation,
+                           const Eigen::Vector3d& eye_m, const RegistrationOptions& options, bool thorough) {
   constexpr double kRoughSpacing_m = 0.016;
   const Points rough_scene = Thinned(cluster, kRoughSpacing_m);
   const NearestPoints rough_tree(rough_scene);
@@ -142,8 +147,9 @@ Registration RegisterCluster(const Points& cluster, const TargetModel& model, co
     settled.push_back(refined(candidate.world_T_target, 0.05, 0.04, 8));
   }
   settled = Best(std::move(settled), orientation, kMostTurn_rad, 1);
-  Registration result;
-  if (settled.empty()) return result;
+  ClusterFit fit;
+  Registration& result = fit.registration;
+  if (settled.empty()) return fit;
   Pose pose = settled.front().world_T_target;
 
   const NearestPoints tree(cluster);
@@ -155,7 +161,32 @@ Registration RegisterCluster(const Points& cluster, const TargetModel& model, co
   result.explained = quality.explained;
   result.rms_m = quality.rms_m;
   result.points = static_cast<int>(cluster.size());
-  return result;
+  fit.contradiction = Contradict(fine, pose);
+  return fit;
+}
+
+/// What nothing speaks against comes before what something does.
+bool Better(const ClusterFit& a, const ClusterFit& b, double score_a, double score_b) {
+  if (a.contradiction.any() != b.contradiction.any()) return a.registration.fitness > 0 && !a.contradiction.any();
+  return score_a > score_b;
+}
+
+std::string WhyNotFound(const ClusterFit& best, const RegistrationOptions& options) {
+  const Registration& fit = best.registration;
+  if (fit.points == 0) {
+    return fmt::format("every fit is turned by more than {:.0f} degrees", kMostTurn_rad * 57.29577951308232);
+  }
+  if (fit.fitness < options.least_fitness) {
+    return fmt::format("the best fit meets {:.0f} % of what should be seen of the target, below {:.0f} %",
+                       100.0 * fit.fitness, 100.0 * options.least_fitness);
+  }
+  if (best.contradiction.beyond > Contradiction::kMostBeyond) {
+    return fmt::format(
+        "what is seen is larger than the target: beyond its edges {:.0f} % as many points lie on its faces as within",
+        100.0 * best.contradiction.beyond);
+  }
+  return fmt::format("the camera sees through {:.0f} % of where the target would be",
+                     100.0 * best.contradiction.seen_through);
 }
 
 }  // namespace
@@ -194,7 +225,8 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
   for (const Eigen::Vector3d& p : scene) {
     if (p.allFinite() && p.cwiseAbs().maxCoeff() < kFarthest_m) finite.push_back(p);
   }
-  Registration best;
+  ClusterFit chosen;
+  Registration& best = chosen.registration;
   const Points thinned = Thinned(finite, options.scene_spacing_m);
   if (thinned.empty()) {
     best.reason = "no points are left once the background is taken away";
@@ -207,10 +239,10 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
     return best;
   }
   for (const Cluster& cluster : clusters) {
-    Registration fit = RegisterCluster(cluster.points, model, nominal_orientation, eye_m, options, false);
-    if (fit.fitness > best.fitness) best = std::move(fit);
+    ClusterFit fit = RegisterCluster(cluster.points, model, nominal_orientation, eye_m, options, false);
+    if (Better(fit, chosen, fit.registration.fitness, best.fitness)) chosen = std::move(fit);
   }
-  if (best.fitness < kSureFitness || best.rms_m > kSureRms_m) {
+  if (best.fitness < kSureFitness || best.rms_m > kSureRms_m || chosen.contradiction.any()) {
     // Something may stand before the target and cut it in two: all that is near belongs to it, and fits start aside
     // too.
     Points middles;
@@ -222,17 +254,13 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
       middles.push_back(cluster.densest_m);
       Points company;
       std::copy_if(thinned.begin(), thinned.end(), std::back_inserter(company), near(2.0 * model.radius_m()));
-      Registration fit = RegisterCluster(company, model, nominal_orientation, eye_m, options, true);
-      if (fit.fitness - fit.rms_m / kMet_m > best.fitness - best.rms_m / kMet_m) best = std::move(fit);
+      ClusterFit fit = RegisterCluster(company, model, nominal_orientation, eye_m, options, true);
+      const auto score = [](const Registration& r) { return r.fitness - r.rms_m / kMet_m; };
+      if (Better(fit, chosen, score(fit.registration), score(best))) chosen = std::move(fit);
     }
   }
-  best.found = best.fitness >= options.least_fitness;
-  if (!best.found && best.points == 0) {
-    best.reason = fmt::format("every fit is turned by more than {:.0f} degrees", kMostTurn_rad * 57.29577951308232);
-  } else if (!best.found) {
-    best.reason = fmt::format("the best fit meets {:.0f} % of what should be seen of the target, below {:.0f} %",
-                              100.0 * best.fitness, 100.0 * options.least_fitness);
-  }
+  best.found = best.fitness >= options.least_fitness && !chosen.contradiction.any();
+  if (!best.found) best.reason = WhyNotFound(chosen, options);
   return best;
 }
 

@@ -148,6 +148,39 @@ TEST(Registration, WhatIsNotThereIsNotFound) {
   EXPECT_NE(reason(post), "");
 }
 
+/// What a camera sees of a level rectangle of this size, with noise.
+Points Plate(const Eigen::Vector3d& centre_m, double width_m, double depth_m, double sigma_m, std::uint64_t seed) {
+  Points points;
+  RandomStream random(seed, 0, "plate");
+  const auto noise = [&] { return sigma_m * random.Normal(); };
+  constexpr double kSpacing_m = 0.003;
+  for (double x = -width_m / 2; x <= width_m / 2; x += kSpacing_m) {
+    for (double y = -depth_m / 2; y <= depth_m / 2; y += kSpacing_m) {
+      points.emplace_back(centre_m + Eigen::Vector3d(x + noise(), y + noise(), noise()));
+    }
+  }
+  return points;
+}
+
+TEST(Registration, APlateIsNotTheTarget) {
+  // Larger than the target's own plate, as large, and much larger: in none of them is there a housing.
+  for (const auto& [width_m, depth_m] : {std::pair{0.8, 0.8}, {0.3, 0.24}, {0.5, 0.4}, {1.5, 1.0}}) {
+    const Registration result = Register(Plate({0.6, 0.0, 0.2}, width_m, depth_m, 0.001, 1), Model(), kUpright, kEye);
+    EXPECT_FALSE(result.found) << width_m << ": fitness " << result.fitness << " explained " << result.explained;
+    EXPECT_NE(result.reason, "");
+  }
+}
+
+TEST(Registration, ThePlateBesideDoesNotHideTheTarget) {
+  const Pose truth = MakePose(Eigen::Vector3d(0.5, 0.2, 0.25), 0.1);
+  Points scene = SyntheticScene(truth, kEye, 0.001, 6);
+  const Points plate = Plate({0.5, -0.6, 0.2}, 0.8, 0.6, 0.001, 2);
+  scene.insert(scene.end(), plate.begin(), plate.end());
+  const Registration found = Register(scene, Model(), kUpright, kEye);
+  ASSERT_TRUE(found.found) << found.reason;
+  EXPECT_LT((found.world_T_target.translation() - truth.translation()).norm(), 0.003);
+}
+
 TEST(Registration, NothingIsFoundTurnedTooFar) {
   RandomStream random(8, 0, "turned");
   constexpr double kMost_rad = 0.45;
