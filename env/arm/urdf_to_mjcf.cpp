@@ -14,8 +14,8 @@
 #include <sstream>
 
 #include "feeler/core/error.h"
-#include "feeler/env/model/mujoco_handles.h"
 #include "feeler/env/mjcf/plain_locale.h"
+#include "feeler/env/model/mujoco_handles.h"
 
 namespace feeler::env {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "feeler/core/robot.h"
-#include "feeler/execution/remote/messages.h"
+#include "feeler/execution/remote/protocol/messages.h"
 
 namespace feeler::execution {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
-#include "feeler/execution/remote/messages_numbers.h"
+#include "feeler/execution/remote/protocol/messages_numbers.h"
 #include "feeler/version.h"
 
 namespace feeler::execution {

@@ -10,7 +10,7 @@
 
 #include "feeler/core/progress.h"
 #include "feeler/core/robot.h"
-#include "feeler/execution/remote/messages.h"
+#include "feeler/execution/remote/protocol/messages.h"
 #include "feeler/execution/remote/socket.h"
 
 namespace feeler::execution {

@@ -12,8 +12,8 @@
 #include "feeler/core/progress.h"
 #include "feeler/core/robot.h"
 #include "feeler/execution/remote/link.h"
-#include "feeler/execution/remote/messages.h"
 #include "feeler/execution/remote/ordered_faults.h"
+#include "feeler/execution/remote/protocol/messages.h"
 #include "feeler/execution/remote/socket.h"
 
 namespace feeler::execution {

@@ -47,7 +47,7 @@ def schema_validator(path=None):
     import jsonschema
 
     here = os.path.dirname(os.path.abspath(__file__))
-    with open(path or os.path.join(here, "..", "..", "execution", "remote", "protocol.schema.json")) as f:
+    with open(path or os.path.join(here, "..", "..", "execution", "remote", "protocol", "protocol.schema.json")) as f:
         schema = json.load(f)
     known = {}
 

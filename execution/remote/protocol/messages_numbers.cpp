@@ -1,4 +1,4 @@
-#include "feeler/execution/remote/messages_numbers.h"
+#include "feeler/execution/remote/protocol/messages_numbers.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "feeler/core/error.h"
-#include "feeler/execution/remote/wire_pose.h"
+#include "feeler/execution/remote/protocol/wire_pose.h"
 
 namespace feeler::execution {
 namespace {

@@ -1,4 +1,4 @@
-#include "feeler/execution/remote/messages_json.h"
+#include "feeler/execution/remote/protocol/messages_json.h"
 
 #include <array>
 #include <functional>
@@ -6,8 +6,8 @@
 #include "feeler/core/error.h"
 #include "feeler/core/printable.h"
 #include "feeler/execution/records/base64.h"
-#include "feeler/execution/remote/schema.h"
-#include "feeler/execution/remote/wire_pose.h"
+#include "feeler/execution/remote/protocol/schema.h"
+#include "feeler/execution/remote/protocol/wire_pose.h"
 #include "feeler/policies/io/json_input.h"
 
 namespace feeler::execution {

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "feeler/execution/remote/messages.h"
+#include "feeler/execution/remote/protocol/messages.h"
 
 namespace feeler::execution {
 

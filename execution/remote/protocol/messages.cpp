@@ -1,10 +1,10 @@
-#include "feeler/execution/remote/messages.h"
+#include "feeler/execution/remote/protocol/messages.h"
 
 #include <array>
 
 #include "feeler/core/error.h"
-#include "feeler/execution/remote/messages_json.h"
-#include "feeler/execution/remote/messages_numbers.h"
+#include "feeler/execution/remote/protocol/messages_json.h"
+#include "feeler/execution/remote/protocol/messages_numbers.h"
 
 namespace feeler::execution {
 

@@ -1,4 +1,4 @@
-#include "feeler/execution/remote/schema.h"
+#include "feeler/execution/remote/protocol/schema.h"
 
 #include <fmt/format.h>
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "feeler/core/error.h"
-#include "feeler/execution/remote/messages.h"
-#include "feeler/execution/remote/schema.h"
+#include "feeler/execution/remote/protocol/messages.h"
+#include "feeler/execution/remote/protocol/schema.h"
 
 namespace feeler::execution {
 namespace {
