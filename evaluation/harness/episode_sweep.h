@@ -90,7 +90,7 @@ class EpisodeSweep {
 
   std::string experiment_;
   std::vector<EpisodeSetting> settings_;
-  const ExperimentRequest& request_;
+  ExperimentRequest request_;
 };
 
 }  // namespace feeler::evaluation
