@@ -59,7 +59,7 @@ bool Finite(const std::vector<double>& values) {
 bool Finite(const WorldState& s) {
   return std::isfinite(s.time_s) && s.time_s >= 0 && Finite(s.qpos) && Finite(s.qvel) && Finite(s.warmstart) &&
          Finite(s.mocap_pos) && Finite(s.mocap_quat) && s.tool_at_contact.matrix().allFinite() &&
-         s.applied_torque_nm.allFinite() &&
+         s.applied_torque_nm.allFinite() && s.port_home_m.allFinite() &&
          std::all_of(s.contacts.begin(), s.contacts.end(), [](const ContactForce& c) {
            return c.point_m.allFinite() && c.force_n.allFinite() && c.torque_nm.allFinite() &&
                   std::isfinite(c.distance_m);

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 
 namespace feeler::env {
 
@@ -44,5 +45,26 @@ struct TaskText {
     return mjcf + "</worldbody>\n</mujoco>\n";
   }
 };
+
+/// An asset: a frame, a square of half width `outer_m` with a square hole of 10 mm, as one closed mesh.
+inline std::string FrameMesh(double outer_m) {
+  std::string v;
+  for (const char* z : {"0", "-0.02"}) {
+    for (const double s : {outer_m, 0.005}) {
+      for (const auto& [x, y] : {std::pair{-s, -s}, {s, -s}, {s, s}, {-s, s}}) {
+        v += std::to_string(x) + " " + std::to_string(y) + " " + z + "  ";
+      }
+    }
+  }
+  const int quads[16][4] = {{0, 1, 5, 4},   {1, 2, 6, 5},    {2, 3, 7, 6},     {3, 0, 4, 7},
+                            {8, 12, 13, 9}, {9, 13, 14, 10}, {10, 14, 15, 11}, {11, 15, 12, 8},
+                            {0, 8, 9, 1},   {1, 9, 10, 2},   {2, 10, 11, 3},   {3, 11, 8, 0},
+                            {4, 5, 13, 12}, {5, 6, 14, 13},  {6, 7, 15, 14},   {7, 4, 12, 15}};
+  std::string f;
+  for (const auto& q : quads) {
+    for (const int i : {0, 1, 2, 0, 2, 3}) f += std::to_string(q[i]) + " ";
+  }
+  return "<asset><mesh name=\"frame\" vertex=\"" + v + "\" face=\"" + f + "\"/></asset>";
+}
 
 }  // namespace feeler::env

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "feeler/core/error.h"
 #include "tests/env/plug_world.h"
@@ -82,6 +83,9 @@ TEST_F(CompliantPort, ASavedStateGoesOn) {
   const RobotState saved = robot_.Save();
   Press(30.0, 0.5);
   const double expected = Given();
+  RobotState tampered = saved;
+  tampered.world.port_home_m.x() = std::nan("");
+  EXPECT_THROW(robot_.Restore(tampered), InputError);
   Place(0.0);
   robot_.Restore(saved);
   Press(30.0, 0.5);
