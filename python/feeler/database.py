@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import _feeler
-from .errors import one_sentence
+from .errors import as_path, as_paths, input_error, one_sentence
 from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task
 from .results import Result, fields
 
@@ -23,7 +23,7 @@ class Database:
     """
 
     def __init__(self, path: str | os.PathLike[str], task: Task | str | None = None) -> None:
-        self._core = _feeler.Database.open(os.fspath(path))
+        self._core = _feeler.Database.open(as_path(path, "path"))
         identity = self._core.identity
         self._task = task
         self.identity = Result(identity)
@@ -105,16 +105,19 @@ def preprocess(
         ``info`` of the whole database.
     """
     loaded = as_task(task, opening=opening, goal=goal, cost=cost)
+    if family is not None and not isinstance(family, str | Sequence):
+        raise input_error("family", f"is of type {type(family).__name__}", 'give "2..5x2..5x2..5" or a list of extents')
     summary, info = _feeler.preprocess(
-        loaded._core, family, options, order, experience, jobs, os.fspath(out), cancellation, progress
+        loaded._core, family, options, order, experience, jobs, as_path(out, "out"), cancellation, progress
     )
     return Result(fields(summary), info=fields(info))
 
 
+@one_sentence
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str]) -> int:
     """Puts databases of one task and one setting together; where two hold the same problem, the better answer stays.
 
     Returns:
         int: how many problems were written.
     """
-    return _feeler.merge_databases([os.fspath(path) for path in paths], os.fspath(out))
+    return _feeler.merge_databases(as_paths(paths, "paths"), as_path(out, "out"))

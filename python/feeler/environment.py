@@ -30,8 +30,17 @@ def check_task(task: Any) -> str:
     return os.fspath(task)
 
 
+def check_counts(**values: Any) -> None:
+    """Whole numbers, by name; their ranges are for those who take them."""
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            raise input_error(name, f"is {value!r}", "give a whole number")
+
+
 def check_cameras(cameras: Any) -> tuple[str, ...]:
     """Names of the cameras whose pictures are part of the observations."""
+    if not isinstance(cameras, str | list | tuple):
+        raise input_error("cameras", f"are of type {type(cameras).__name__}", "give a tuple of names")
     names = (cameras,) if isinstance(cameras, str) else tuple(cameras)
     for name in names:
         if name not in ("wrist", "static"):
@@ -103,6 +112,7 @@ class InsertionEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise input_error("render_mode", f'unknown mode "{render_mode}"', f"choose from {', '.join(RENDER_MODES)}")
+        check_counts(control_steps=control_steps, width=width, height=height)
         self._arguments: dict[str, Any] = {
             "task": check_task(task),
             "actions": actions,
@@ -127,7 +137,7 @@ class InsertionEnv(gymnasium.Env[Any, Any]):
         self.observation_space = spaces.observation_space(observations, self._cameras, width, height)
         self.action_space = spaces.action_space(actions)
         self._action_shape: tuple[int, ...] = self.action_space.shape or ()
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1000 / control_steps))}
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1000 / max(1, control_steps)))}
         self._seed: int | None = None
         self._episode = 0
         self._options: dict[str, Any] = {}
@@ -177,6 +187,8 @@ class InsertionEnv(gymnasium.Env[Any, Any]):
             number, episode = self._seed, self._episode + 1
         if options and options.get("episode") is not None:
             episode = options["episode"]
+            if isinstance(episode, bool) or not isinstance(episode, int | np.integer) or not 0 <= episode < 2**63:
+                raise input_error("episode", f"is {episode!r}", "give a whole number from 0 on")
         flat, _, _, _, info = core.reset(number, episode, options or {})
         self._seed, self._episode = number, int(episode)
         self._options = copy.copy(options or {})

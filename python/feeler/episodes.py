@@ -9,7 +9,7 @@ from typing import Any
 
 from . import _feeler
 from .database import Database
-from .errors import input_error, one_sentence
+from .errors import as_path, input_error, one_sentence
 from .planner import Cancellation, Extents, PolicyGraph, Progress, Task, as_task, require_policy_for
 from .policy import Policy
 from .results import Result, fields
@@ -34,7 +34,7 @@ class Run(Result):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the records, one JSON object a line."""
-        path = os.fspath(path)
+        path = as_path(path, "path")
         partial = f"{path}.part"
         with open(partial, "w", encoding="utf-8") as file:
             for record in self["records"]:
@@ -125,7 +125,7 @@ def run(
         extents,
         noise,
         placement,
-        "" if table is None else os.fspath(table),
+        "" if table is None else as_path(table, "table"),
         ladder,
         withhold_true_pose,
         replay,
@@ -141,7 +141,7 @@ def run(
 
 def read_records(path: str | os.PathLike[str]) -> Run:
     """A records file (``feeler run --out``) with its summary. Raises InputError naming file and line."""
-    summary = fields(_feeler.summarize(os.fspath(path)))
+    summary = fields(_feeler.summarize(as_path(path, "path")))
     with open(path, encoding="utf-8") as file:
         records = [Episode(fields(json.loads(line))) for line in file if line.strip()]
     return Run(summary, records=records)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .errors import input_error, one_sentence
+from .errors import as_path, input_error, one_sentence
 from .planner import Progress
 from .results import Result, fields
 
@@ -53,7 +53,7 @@ def experiment(
         Result: ``complete``, ``text`` (the table for people), and the content of NAME.json as ``data`` (None where it was
         stopped).
     """
-    folder = os.fspath(out)
+    folder = as_path(out, "out")
     command = f"feeler.experiment({name!r}, {folder!r}, quick={quick}, seed={seed})"
     answer = fields(
         _module().run_experiment(name, folder, quick, jobs, task or "", seed, solver_seeds, command, progress)
@@ -67,4 +67,4 @@ def experiment(
 @one_sentence
 def report(folder: str | os.PathLike[str], out: str | os.PathLike[str], replay_megabytes: float = 12.0) -> Result:
     """Writes one self-contained page of a folder of results: ``experiments``, ``episodes``, ``faults``, ``bytes``, ``path``."""
-    return fields(_module().report(os.fspath(folder), os.fspath(out), replay_megabytes))
+    return fields(_module().report(as_path(folder, "folder"), as_path(out, "out"), replay_megabytes))

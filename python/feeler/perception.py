@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _feeler
-from .errors import input_error, one_sentence
+from .errors import as_path, input_error, one_sentence
 from .planner import Task, as_task
 from .results import Result, fields
 
@@ -24,7 +24,7 @@ class PosePerception:
 
     def __init__(self, task: Task | str, table: str | os.PathLike[str] | None = None) -> None:
         self._task = as_task(task)
-        self._core = _feeler.Finder(self._task._core, "" if table is None else os.fspath(table))
+        self._core = _feeler.Finder(self._task._core, "" if table is None else as_path(table, "table"))
 
     def depth(self, image: ArrayLike, camera: dict[str, Any], background: ArrayLike | None = None) -> Result:
         """The target in a depth image.

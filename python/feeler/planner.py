@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _feeler
 from ._feeler import Cancellation
-from .errors import input_error, one_sentence
+from .errors import as_path, input_error, one_sentence
 from .results import Result, fields
 
 Extents = str | Sequence[int]
@@ -182,7 +182,7 @@ class PolicyGraph:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the policy file (docs/file-formats.md)."""
-        self._core.save(os.fspath(path), self._task or self.problem.name)
+        self._core.save(as_path(path, "path"), self._task or self.problem.name)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of the policy file."""
@@ -221,7 +221,7 @@ class Task:
         goal: str | None = None,
         cost: str = "distance",
     ) -> None:
-        self._core = _feeler.PlanningTask(os.fspath(name), opening, goal or "", cost)
+        self._core = _feeler.PlanningTask(as_path(name, "task"), opening, goal or "", cost)
         self.opening, self.goal, self.cost = opening, goal, cost
 
     name = property(lambda self: self._core.name, doc="As the file says.")
@@ -422,4 +422,4 @@ def lattice_problem(
 
 def read_problem(path: str | os.PathLike[str]) -> Problem:
     """A lattice problem file (docs/file-formats.md)."""
-    return Problem(_feeler.read_lattice_problem(os.fspath(path)))
+    return Problem(_feeler.read_lattice_problem(as_path(path, "path")))

@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _feeler, spaces
-from .environment import RENDER_MODES, check_cameras, check_task, core_options, scene_of
+from .environment import RENDER_MODES, check_cameras, check_counts, check_task, core_options, scene_of
 from .errors import input_error, one_sentence
 
 _MODES = {
@@ -74,6 +74,7 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             )
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise input_error("num_envs", f"is {num_envs!r}", "give 1 or more")
+        check_counts(control_steps=control_steps, width=width, height=height)
         if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int)):
             raise input_error("threads", f"are {threads!r}", "give 1 or more")
         if isinstance(autoreset_mode, str):
@@ -107,7 +108,7 @@ class VectorInsertionEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.metadata = {
             **self.metadata,
             "autoreset_mode": autoreset_mode,
-            "render_fps": max(1, round(1000 / control_steps)),
+            "render_fps": max(1, round(1000 / max(1, control_steps))),
         }
         options = core_options(
             {

@@ -192,6 +192,9 @@ def test_options_of_the_reset():
         ({"estimate": np.full((4, 4), np.nan)}, "rigid"),
         ({"extents": [1, 1]}, "extents"),
         ({"extents": "many"}, "wrong type"),
+        ({"extents": [None, 1, 1]}, "wrong type"),
+        ({"episode": "first"}, "episode"),
+        ({"episode": -1}, "episode"),
         ({"noise": "loud"}, "loud"),
         ({"noise": {"force_noise_n": -1.0}}, "force_noise"),
         ({"noise": {"volume": 1.0}}, "unknown key"),
@@ -205,6 +208,26 @@ def test_bad_options_are_refused(options, what):
     with pytest.raises(feeler.InputError, match=what):
         env.reset(seed=1, options=options)
     env.reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        ({"task": None}, "task: is of type NoneType"),
+        ({"control_steps": None}, "control_steps: is None"),
+        ({"control_steps": 2.5}, "control_steps: is 2.5"),
+        ({"control_steps": 0}, "control_steps"),
+        ({"width": "wide"}, "width: is 'wide'"),
+        ({"cameras": 3}, "cameras: are of type int"),
+        ({"max_displacement_m": float("nan")}, "max_displacement_m: is nan"),
+        ({"time_limit_s": "long"}, "time_limit_s"),
+    ],
+)
+def test_bad_arguments_are_one_sentence(arguments, what):
+    for make in (feeler.InsertionEnv, feeler.VectorInsertionEnv):
+        with pytest.raises(feeler.InputError, match=what) as caught:
+            make(**arguments)
+        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("seed", [-1, 2**64, 1.5, "one", True])
