@@ -112,6 +112,8 @@ class Robot {
   virtual void ZeroWrench() = 0;
   /// Seconds since the last reset, simulated or real.
   virtual double Time() const = 0;
+  /// Of the joints, from the base outwards, rad. Empty where the robot does not tell.
+  virtual std::vector<double> JointPositions() const { return {}; }
 
   /// Free-space motion through joint space around obstacles; not guarded beyond a protective stop at contact.
   virtual MotionResult Transfer(const Pose& world_T_tool) = 0;

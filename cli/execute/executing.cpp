@@ -4,10 +4,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <utility>
 
 #include "feeler/cli/common/console.h"
 #include "feeler/core/clock.h"
+#include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 #include "feeler/execution/records/pose_error.h"
 #include "feeler/execution/records/scored_reason.h"
@@ -62,6 +65,7 @@ Executing::Executing(const ExecuteFlags& flags, const Session& session)
                      "calibrate with the tool that is held");
   }
   robot_ = Dial();
+  FindArm();
   if (!welcome().simulated) {
     if (flags.estimate.empty()) {
       throw InputError("--estimate", "missing: a robot does not say where the target is",
@@ -73,6 +77,28 @@ Executing::Executing(const ExecuteFlags& flags, const Session& session)
       throw InputError(flags.cell, "is of the robot '" + cell_.robot + "', and here is '" + welcome().robot + "'",
                        "calibrate this cell");
     }
+  }
+}
+
+void Executing::FindArm() {
+  const bool told = !welcome().state.joints_rad.empty();
+  if (!flags_.arm.empty()) {
+    if (!told) {
+      throw InputError("--arm", "'" + welcome().robot + "' does not tell where its joints are",
+                       "update the robot's program, or leave --arm away");
+    }
+    arm_.emplace(planner::SerialArm::FromUrdf(flags_.arm, flags_.arm_base));
+    return;
+  }
+  const std::string& name = welcome().capabilities.arm;
+  const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+  if (told && !name.empty() && plain) {
+    const std::filesystem::path file = FindData("models") / "robots" / (name + ".urdf");
+    if (std::filesystem::exists(file)) arm_.emplace(planner::SerialArm::FromUrdf(file.string(), flags_.arm_base));
+  }
+  if (!arm_) {
+    Note("feeler: joint limits and singularities are left to the robot: {}\n",
+         told ? "give --arm URDF to have them checked" : "it does not tell where its joints are");
   }
 }
 
@@ -231,7 +257,7 @@ void Executing::ShowMotion(const execution::ExecutionRecord& record) const {
        move.peak_force_n, left, record.hypotheses);
 }
 
-execution::SafetyLimits Executing::LimitsFor(const ExecutorOptions& options) const {
+execution::SafetyLimits Executing::LimitsFor(const ExecutorOptions& options) {
   execution::SafetyLimits limits;
   if (cell_.box) limits.box = *cell_.box;
   if (!flags_.box.empty()) limits.box = ParseBox("--box", flags_.box);
@@ -239,6 +265,14 @@ execution::SafetyLimits Executing::LimitsFor(const ExecutorOptions& options) con
   limits.speed_scale = flags_.speed;
   limits.most_compliant_n = options.insertion_force_limit_n;
   limits.force_budget_n = options.force_budget_n;
+  if (arm_) {
+    // A dry run leaves the arm where it is: the check follows the joints by itself.
+    limits.way_fault = [this, asked = false](const execution::PlannedWay& way) mutable {
+      const bool told = !flags_.dry_run || !asked;
+      asked = true;
+      return arm_->FaultOf(told ? robot_->JointPositions() : std::vector<double>{}, way);
+    };
+  }
   return limits;
 }
 
@@ -319,6 +353,8 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
       return operator_.Agrees(text + "  [Enter: go, anything else: stop] ") ? "" : "the operator said no";
     });
   }
+  const double robot_start_s = robot.Time();
+  const double wall_start_s = execution::MonotonicSeconds();
   const double transfer_start_s = ThreadCpuSeconds();
   const MotionResult transfer = robot.Transfer(execution::LatticeStartPose(task, problem, told->world_T_estimate));
   line.transfer_cpu_s = ThreadCpuSeconds() - transfer_start_s;
@@ -327,6 +363,8 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   } else {
     episode.execution.reason = execution::TransferFailure(transfer);
   }
+  episode.robot_s = robot.Time() - robot_start_s;
+  episode.wall_s = execution::MonotonicSeconds() - wall_start_s;
   episode.execution.force_budget_n = options.force_budget_n;
   episode.link_lost = !robot_->lost().empty();
   Judge(*told, episode);

@@ -26,6 +26,8 @@ struct ExecutedEpisode {
   execution::EpisodeLine line;
   execution::ExecutionRecord execution;
   bool link_lost = false;
+  double robot_s = 0.0;  ///< on the robot's clock, the transfer to the start pose included
+  double wall_s = 0.0;   ///< the same on this computer's
 };
 
 /// Episodes on whatever speaks the wire protocol.
@@ -50,7 +52,8 @@ class Executing {
   std::optional<execution::EpisodeReply> Told();
   std::unique_ptr<policies::Policy> PolicyFor(const planner::Extents& extents);
   execution::ExecutorOptions OptionsFor(const execution::EpisodeReply& told, bool angles) const;
-  execution::SafetyLimits LimitsFor(const execution::ExecutorOptions& options) const;
+  execution::SafetyLimits LimitsFor(const execution::ExecutorOptions& options);
+  void FindArm();
   void Judge(const execution::EpisodeReply& told, ExecutedEpisode& episode);
   void ShowMotion(const execution::ExecutionRecord& record) const;
 
@@ -65,6 +68,7 @@ class Executing {
   std::shared_ptr<execution::OnlinePlanner> online_planner_ = std::make_shared<execution::OnlinePlanner>();
   std::unique_ptr<execution::Listener> listener_;  ///< where the robot dials in
   std::unique_ptr<execution::RemoteRobot> robot_;
+  std::optional<execution::ArmCheck> arm_;
   bool started_ = false;
   std::int64_t done_ = 0;
 };

@@ -45,6 +45,10 @@ void AddExecuteFlags(CLI::App& app, ExecuteFlags& flags) {
              "how many (default: all that a simulation offers, one on a robot)", false);
   app.add_option("--cell", flags.cell, "cell file (feeler cell calibrate): workspace box, sensor, tool, forces");
   app.add_option("--box", flags.box, "the tool stays within: x0,y0,z0,x1,y1,z1, base frame, m");
+  app.add_option("--arm", flags.arm,
+                 "URDF of the arm: ways are checked for reach, joint limits and singularities before they are sent "
+                 "(default: what the robot says it is, if Feeler has it)");
+  app.add_option("--arm-base", flags.arm_base, "link of it whose frame the robot tells poses in (default: its root)");
   AddReal(app, "--speed", flags.speed, 0.01, 1.0, "all Cartesian speeds times this");
   AddReal(app, "--force-budget", flags.force_budget_n, 1.0, 1000.0,
           "no motion that feels may ask for a contact force above this, N (default: no limit)", false);

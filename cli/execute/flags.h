@@ -17,6 +17,8 @@ struct ExecuteFlags {
   std::string extents;
   std::string estimate;
   std::string box;
+  std::string arm;
+  std::string arm_base;
   std::string cell;
   std::string token_file;
   std::string out;

@@ -35,6 +35,8 @@ struct Tally {
   std::vector<double> times_s;
   double peak_force_n = 0.0;
   double robot_time_s = 0.0;
+  double clock_s = 0.0;  ///< of the robot, transfers to the start poses included
+  double clock_wall_s = 0.0;
   std::map<std::string, int> failures;
 };
 
@@ -44,6 +46,8 @@ void Count(const ExecutedEpisode& episode, Tally& tally) {
   tally.believed_inserted += episode.execution.inserted ? 1 : 0;
   tally.peak_force_n = std::max(tally.peak_force_n, episode.line.peak_force_n);
   tally.robot_time_s += episode.execution.sim_time_s;
+  tally.clock_s += episode.robot_s;
+  tally.clock_wall_s += episode.wall_s;
   const bool judged = episode.line.inserted.has_value();
   tally.judged += judged ? 1 : 0;
   tally.localized += episode.line.localized.value_or(false) ? 1 : 0;
@@ -69,13 +73,14 @@ nlohmann::json Summary(const Tally& tally, const Executing& executing, double wa
           {"sim_time_median_s", times.empty() ? unknown : nlohmann::json(times[times.size() / 2])},
           {"robot_time_s", tally.robot_time_s},
           {"wall_s", wall_s},
+          {"wall_per_robot_time", tally.clock_s > 0.0 ? nlohmann::json(tally.clock_wall_s / tally.clock_s) : unknown},
           {"peak_force_max_n", tally.peak_force_n},
           {"links_lost", tally.links_lost},
           {"failures", tally.failures}};
 }
 
 void Run(const ExecuteFlags& flags, Session& session) {
-  RequireOutputs({{"--out", flags.out, FileKind::kRecords}}, {flags.db, flags.cell, flags.token_file});
+  RequireOutputs({{"--out", flags.out, FileKind::kRecords}}, {flags.db, flags.cell, flags.token_file, flags.arm});
   if (!flags.estimate.empty()) ParseEstimate(flags.estimate);  // bad input is told before the robot is called
   if (!flags.box.empty()) ParseBox("--box", flags.box);
   Executing executing(flags, session);

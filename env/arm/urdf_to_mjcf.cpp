@@ -1,52 +1,21 @@
 #include "feeler/env/arm/urdf_to_mjcf.h"
 
-#include <console_bridge/console.h>
 #include <fmt/format.h>
-#include <urdf_model/model.h>
-#include <urdf_parser/urdf_parser.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <set>
-#include <sstream>
 
 #include "feeler/core/error.h"
-#include "feeler/env/mjcf/plain_locale.h"
 #include "feeler/env/model/mujoco_handles.h"
+#include "feeler/planner/motion/robot_description.h"
 
 namespace feeler::env {
 namespace {
 
 using tinyxml2::XMLElement;
-
-// urdfdom reports through a process-wide handler; what it says is kept for the error message of this thread.
-thread_local std::string last_urdf_message;
-
-class KeepMessage : public console_bridge::OutputHandler {
- public:
-  void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/, int /*line*/) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_WARN) last_urdf_message = text;
-  }
-};
-
-urdf::ModelInterfaceSharedPtr ReadUrdf(const std::string& file) {
-  const PlainLocale plain;
-  static KeepMessage handler;
-  console_bridge::useOutputHandler(&handler);
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file, "cannot read the robot description", "give a readable URDF file");
-  std::stringstream text;
-  text << in.rdbuf();
-  last_urdf_message.clear();
-  urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(text.str());
-  if (!model || !model->getRoot()) {
-    throw InputError(file, "not a valid robot description: " + last_urdf_message, "correct the URDF");
-  }
-  return model;
-}
 
 Eigen::Matrix3d Rotation(const urdf::Rotation& r) {
   return Eigen::Quaterniond(r.w, r.x, r.y, r.z).normalized().toRotationMatrix();
@@ -299,7 +268,7 @@ class Emitter {
 }  // namespace
 
 RobotMjcf EmitRobot(const std::string& urdf_file, const UrdfToMjcfOptions& options, XMLElement& mujoco) {
-  const urdf::ModelInterfaceSharedPtr model = ReadUrdf(urdf_file);
+  const urdf::ModelInterfaceSharedPtr model = planner::ReadRobotDescription(urdf_file);
   XMLElement* worldbody = mujoco.FirstChildElement("worldbody");
   if (worldbody == nullptr) worldbody = mujoco.InsertNewChildElement("worldbody");
   return Emitter(urdf_file, *model, options, mujoco).Emit(*worldbody);

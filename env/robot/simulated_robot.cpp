@@ -411,7 +411,7 @@ MotionResult SimulatedRobot::Transfer(const Pose& world_T_tool) {
       return result;
     }
     planner::MotionLimits limits;
-    limits.velocity_rad_s = options_.joint_speed_fraction * scene.velocity_limit_rad_s;
+    limits.velocity_rad_s = transfer_speed_ * options_.joint_speed_fraction * scene.velocity_limit_rad_s;
     limits.acceleration_rad_s2 = JointVector::Constant(options_.joint_acceleration_rad_s2);
     planner::TimeParametrizationOptions timing;
     timing.reach_m = JointVector::Constant(1.5);  // no point of arm and tool is farther from a joint

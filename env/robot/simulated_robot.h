@@ -116,6 +116,7 @@ class SimulatedRobot : public Robot {
   Wrench ContactWrench() const override { return sensor_.filtered(); }
   void ZeroWrench() override;
   double Time() const override { return world_.time_s(); }
+  std::vector<double> JointPositions() const override { return {measured_q_.data(), measured_q_.data() + kJointCount}; }
   MotionResult Transfer(const Pose& world_T_tool) override;
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult Guarded(const GuardedMotion& motion) override;
@@ -151,6 +152,8 @@ class SimulatedRobot : public Robot {
   /// Where the target may stand, as far as the robot knows: transfers keep clear of all of these. At least one; the
   /// nominal pose after a reset.
   void SetTargetCandidates(std::vector<Pose> world_T_target);
+  /// Transfers take their joint speed times this, above 0 to 1 (a safety field slows the arm).
+  void SlowTransfers(double factor) { transfer_speed_ = factor; }
   /// Motions end with kTimeLimit once Time() reaches it.
   void SetDeadline(double time_s) { deadline_s_ = time_s; }
   /// Asked after every physics step of a motion: a text brings the arm to rest, and the motion ends with kAborted and
@@ -213,6 +216,7 @@ class SimulatedRobot : public Robot {
   Pose tool_at_sensing_ = Pose::Identity();  ///< measured pose in the state that the sensor describes
   double peak_force_n_ = 0.0;                ///< exact, since the motion began
   double deadline_s_ = std::numeric_limits<double>::infinity();
+  double transfer_speed_ = 1.0;
   std::function<std::string()> interruption_;
   std::function<void(const World&)> observer_;
   double observer_period_s_ = 0.0;

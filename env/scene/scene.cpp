@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "feeler/core/error.h"
+#include "feeler/core/plain_locale.h"
 #include "feeler/env/arm/urdf_to_mjcf.h"
-#include "feeler/env/mjcf/plain_locale.h"
 #include "feeler/env/model/task_finding.h"
 #include "feeler/env/scene/contact_capacity.h"
 #include "feeler/env/scene/gripper.h"

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "feeler/execution/contact/force_budget.h"
 
@@ -108,7 +109,7 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
 }
 
 MotionReport Mover::Probe(Direction direction, double coordinate, const std::string& kind,
-                          const PredictedCells& predicted, bool held) {
+                          const PredictedCells& predicted, const MayMeet& may_meet) {
   CheckLimits();
   const Eigen::Vector3d from = Measure(robot_.ToolPose());
   position_ = from;
@@ -119,9 +120,9 @@ MotionReport Mover::Probe(Direction direction, double coordinate, const std::str
   motion.direction = frame_.DirectionInWorld(direction);
   motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
   const ContactResponse told = robot_.Contact(motion.direction);
-  const ContactResponse contact = held ? told.Held() : told;
+  const ContactResponse contact = may_meet.long_wall ? told.Held() : told;
   double& excess = record_.force_excess[static_cast<std::size_t>(direction)];
-  motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedWithinBudget(contact, options_.force_budget_n) / excess);
+  motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedOfProbe(motion.direction, contact, may_meet) / excess);
   motion.contact_force_n = options_.contact_force_n;
   const MotionReport report = Finish(robot_.Guarded(motion), target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
@@ -130,6 +131,22 @@ MotionReport Mover::Probe(Direction direction, double coordinate, const std::str
     excess = std::max(excess, met_n / (motion.speed_m_s * ForcePerSpeed(contact)));
   }
   return report;
+}
+
+double Mover::SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face,
+                           const MayMeet& may_meet) const {
+  double speed_m_s = SpeedWithinBudget(face, options_.force_budget_n);
+  if (!may_meet.edge_towards) return speed_m_s;
+  const Eigen::Vector3d towards = frame_.world_T_estimate.linear() * *may_meet.edge_towards;
+  // The normal of an edge turns from one face to the other; the tool comes along it with the cosine of its speed.
+  constexpr int kNormals = 5;
+  for (int i = 1; i <= kNormals; ++i) {
+    const double angle = 0.5 * std::numbers::pi * i / (kNormals + 1);
+    const Eigen::Vector3d normal = std::cos(angle) * direction + std::sin(angle) * towards;
+    const double along_m_s = SpeedWithinBudget(robot_.Contact(normal), options_.force_budget_n);
+    speed_m_s = std::min(speed_m_s, along_m_s / std::cos(angle));
+  }
+  return speed_m_s;
 }
 
 void Mover::Retreat(const Eigen::Vector3d& target) {

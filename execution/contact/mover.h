@@ -37,6 +37,13 @@ struct MotionReport {
 /// Predicted travel in cells, least and greatest.
 using PredictedCells = std::optional<std::array<double, 2>>;
 
+/// What a probe may meet beside a face across its way.
+struct MayMeet {
+  bool long_wall = false;  ///< one that stops the tool along so much of its length that it cannot turn
+  /// An edge between the way and this direction (unit vector, lattice axes), which pushes the tool anywhere between.
+  std::optional<Eigen::Vector3d> edge_towards;
+};
+
 /// Moves the tool in lattice coordinates, with the orientation of the estimate, and writes every motion into the
 /// record. Throws ExecutionFailure when the robot fails, answers nonsense, or the limits of the episode are exceeded.
 class Mover {
@@ -54,10 +61,9 @@ class Mover {
 
   /// Fast and straight to `target`, watched for contact.
   MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {});
-  /// Slowly along an axis until its coordinate is `coordinate` or a contact comes. `held`: what may be met stops the
-  /// tool along so much of its length that it cannot turn.
+  /// Slowly along an axis until its coordinate is `coordinate` or a contact comes.
   MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted,
-                     bool held = false);
+                     const MayMeet& may_meet = {});
   /// Off a wall: contacts are expected to end, not watched for. Then takes the wrench as zero.
   void Retreat(const Eigen::Vector3d& target);
   /// Compliantly from here straight to `target`, at the speed of an insertion or `speed_m_s`, until the tool rests or,
@@ -76,6 +82,8 @@ class Mover {
 
  private:
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
+  /// The speed of a probe along `direction` (unit vector, world axes) that keeps the budget at whatever it may meet.
+  double SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face, const MayMeet& may_meet) const;
   void CheckLimits() const;
   /// The world is not as the policy knows it: its plan has failed, or a transfer met something hard.
   bool Careful() const;

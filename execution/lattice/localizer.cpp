@@ -219,18 +219,30 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   }
   const double gone = sign * (mover_.position()[axis] - from);
   const PredictedCells left = std::array<double, 2>{(*predicted)[0] - gone, (*predicted)[1] - gone};
-  return MakeTouch(move.direction, from,
-                   mover_.Probe(move.direction, end, "probe", left, MayHold(move.direction, move.cells + overtravel)));
+  return MakeTouch(
+      move.direction, from,
+      mover_.Probe(move.direction, end, "probe", left, WhatMayBeMet(move.direction, move.cells + overtravel)));
 }
 
-bool Localizer::MayHold(Direction direction, double cells) const {
-  if (AxisOf(direction) == AxisOf(task_.insertion)) return false;  // met face to face: the robot counts with that
-  const Eigen::Vector3d station = Station();
-  const Eigen::Vector3d higher = station - mover_.Cells(kHeld_m) * UnitVector(task_.insertion);
-  return std::any_of(tracked_.begin(), tracked_.end(), [&](const TrackedHypothesis& t) {
-    const double travel = PredictTravel(*problem_.map, t, station, direction);
-    return travel <= cells && PredictTravel(*problem_.map, t, higher, direction) <= travel + kSamePlace;
+MayMeet Localizer::WhatMayBeMet(Direction direction, double cells) const {
+  MayMeet met;
+  if (AxisOf(direction) == AxisOf(task_.insertion)) return met;  // a face: the robot counts with that
+  // Where nothing was felt along the insertion yet, the rim of a target may stand anywhere in the cell of its edge.
+  const bool height_felt = std::any_of(evidence_.begin(), evidence_.end(), [&](const Touch& touch) {
+    return touch.contact && touch.direction == task_.insertion;
   });
+  const Eigen::Vector3d back = -UnitVector(task_.insertion);
+  const Eigen::Vector3d station = Station();
+  for (const TrackedHypothesis& t : tracked_) {
+    const double travel = PredictTravel(*problem_.map, t, station, direction);
+    if (travel > cells) continue;
+    const auto same_higher = [&](double by_cells) {
+      return PredictTravel(*problem_.map, t, station + by_cells * back, direction) <= travel + kSamePlace;
+    };
+    if (same_higher(mover_.Cells(kHeld_m))) met.long_wall = true;
+    if (!height_felt && !same_higher(1.0)) met.edge_towards = back;
+  }
+  return met;
 }
 
 bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells) {

@@ -56,9 +56,8 @@ class Localizer {
   /// Carries out the pending motion.
   void Flush();
   void Feel(const GuardedMove& move, const Prediction& prediction);
-  /// Whether what a motion of `cells` from the station may meet stops the tool along so much of its length that it
-  /// cannot turn.
-  bool MayHold(Direction direction, double cells) const;
+  /// What a motion of `cells` from the station may meet beside a face across its way.
+  MayMeet WhatMayBeMet(Direction direction, double cells) const;
   Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
   /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
   /// the tolerance (cells).

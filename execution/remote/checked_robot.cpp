@@ -39,16 +39,21 @@ std::string Describe(const PlannedMotion& motion, const Pose& world_T_tool) {
 std::string CheckedRobot::FaultOf(const PlannedMotion& motion, double watched_force_n, bool straight) const {
   const Capabilities& robot = limits_.robot;
   const Pose here = robot_.ToolPose();
-  if (!motion.world_T_end.matrix().allFinite() || !std::isfinite(motion.speed_m_s) || !std::isfinite(motion.force_n)) {
+  if (!std::isfinite(motion.speed_m_s) || !std::isfinite(motion.force_n)) {
     return "a number of the motion is not finite";
   }
-  const Eigen::Vector3d& end = motion.world_T_end.translation();
-  if (!limits_.box.Contains(end)) return PlaceText(end) + " is outside of the workspace box";
   if (straight && !limits_.box.Contains(here.translation())) {
     return "the tool stands outside of the workspace box, at " + PlaceText(here.translation());
   }
-  if (!WorkspaceBox{robot.workspace_min_m, robot.workspace_max_m}.Contains(end)) {
-    return PlaceText(end) + " is outside of what the robot states as its workspace";
+  std::vector<Pose> places = motion.via;
+  places.push_back(motion.world_T_end);
+  for (const Pose& pose : places) {
+    if (!pose.matrix().allFinite()) return "a number of the motion is not finite";
+    const Eigen::Vector3d& place = pose.translation();
+    if (!limits_.box.Contains(place)) return PlaceText(place) + " is outside of the workspace box";
+    if (!WorkspaceBox{robot.workspace_min_m, robot.workspace_max_m}.Contains(place)) {
+      return PlaceText(place) + " is outside of what the robot states as its workspace";
+    }
   }
   if (motion.speed_m_s > robot.max_speed_m_s * (1.0 + 1e-9)) {
     return fmt::format("{:.3f} m/s is above what the robot states, {:.3f} m/s", motion.speed_m_s, robot.max_speed_m_s);
@@ -61,8 +66,7 @@ std::string CheckedRobot::FaultOf(const PlannedMotion& motion, double watched_fo
     return fmt::format("a force limit of {:.1f} N is above {:.1f} N", motion.force_n,
                        std::min(limits_.most_compliant_n, robot.max_force_n));
   }
-  if (straight && limits_.way_fault) return limits_.way_fault(here, motion.world_T_end);
-  return "";
+  return limits_.way_fault ? limits_.way_fault({here, std::move(places), motion.speed_m_s, straight}) : "";
 }
 
 std::optional<MotionResult> CheckedRobot::Check(const PlannedMotion& motion, double watched_force_n, bool straight) {
@@ -78,14 +82,15 @@ std::optional<MotionResult> CheckedRobot::Check(const PlannedMotion& motion, dou
 
 MotionResult CheckedRobot::Transfer(const Pose& world_T_tool) {
   const double length_m = (world_T_tool.translation() - ToolPose().translation()).norm();
-  if (const auto refused = Check({"transfer", world_T_tool, length_m, 0.0, 0.0}, 0.0, false)) return *refused;
+  if (const auto refused = Check({"transfer", world_T_tool, length_m, 0.0, 0.0, {}}, 0.0, false)) return *refused;
   return robot_.Transfer(world_T_tool);
 }
 
 MotionResult CheckedRobot::LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) {
   const double length_m = (world_T_tool.translation() - ToolPose().translation()).norm();
   const double speed = limits_.speed_scale * speed_m_s;
-  if (const auto refused = Check({"linear", world_T_tool, length_m, speed, contact_force_n}, contact_force_n, true)) {
+  if (const auto refused =
+          Check({"linear", world_T_tool, length_m, speed, contact_force_n, {}}, contact_force_n, true)) {
     return *refused;
   }
   return robot_.LinearMove(world_T_tool, speed, contact_force_n);
@@ -96,7 +101,7 @@ MotionResult CheckedRobot::Guarded(const GuardedMotion& motion) {
   scaled.speed_m_s *= limits_.speed_scale;
   Pose end = ToolPose();
   end.translation() += motion.distance_m * motion.direction;
-  const PlannedMotion planned{"guarded", end, motion.distance_m, scaled.speed_m_s, motion.contact_force_n};
+  const PlannedMotion planned{"guarded", end, motion.distance_m, scaled.speed_m_s, motion.contact_force_n, {}};
   if (const auto refused = Check(planned, motion.contact_force_n, true)) return *refused;
   return robot_.Guarded(scaled);
 }
@@ -112,14 +117,12 @@ MotionResult CheckedRobot::Compliant(const CompliantMotion& motion) {
     length_m += (pose.translation() - before).norm();
     before = pose.translation();
   }
-  for (std::size_t i = 0; i < motion.world_T_tool.size(); ++i) {
-    const bool last = i + 1 == motion.world_T_tool.size();
-    const PlannedMotion planned{"compliant", motion.world_T_tool[i], length_m, scaled.speed_m_s, motion.force_limit_n};
-    const std::string fault = last ? "" : FaultOf(planned, 0.0, i == 0);
-    if (!fault.empty() && refusal_.empty()) refusal_ = fault;
-    if (!last) continue;
-    if (const auto refused = Check(planned, 0.0, motion.world_T_tool.size() == 1)) return *refused;
-  }
+  PlannedMotion planned{"compliant",      Pose::Identity(),     length_m,
+                        scaled.speed_m_s, motion.force_limit_n, motion.world_T_tool};
+  if (planned.via.empty()) return robot_.Compliant(scaled);  // which says what it thinks of no way
+  planned.world_T_end = planned.via.back();
+  planned.via.pop_back();
+  if (const auto refused = Check(planned, 0.0, true)) return *refused;
   return robot_.Compliant(scaled);
 }
 
@@ -130,7 +133,7 @@ MotionResult CheckedRobot::FollowTwist(const TwistMotion& motion) {
   Pose end = ToolPose();
   end.translation() += motion.duration_s * (end.linear() * motion.tool_T_frame.linear() * scaled.linear_m_s);
   const double speed_m_s = scaled.linear_m_s.norm();
-  const PlannedMotion planned{"twist", end, motion.duration_s * speed_m_s, speed_m_s, motion.contact_force_n};
+  const PlannedMotion planned{"twist", end, motion.duration_s * speed_m_s, speed_m_s, motion.contact_force_n, {}};
   if (const auto refused = Check(planned, motion.contact_force_n, true)) return *refused;
   return robot_.FollowTwist(scaled);
 }

@@ -4,8 +4,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "feeler/core/robot.h"
+#include "feeler/execution/remote/arm_check.h"
 #include "feeler/execution/remote/protocol/messages.h"
 
 namespace feeler::execution {
@@ -25,8 +27,8 @@ struct SafetyLimits {
   /// No motion may ask for a contact force above this while it feels (guarded and watched motions); infinite: none.
   double force_budget_n = 1e9;
   double most_compliant_n = 1e9;  ///< nor for a larger force limit of a compliant motion
-  /// Says why a straight way is none for the arm (singular, joint limits); empty function: the robot is trusted to.
-  std::function<std::string(const Pose& from, const Pose& to)> way_fault;
+  /// Says why a way is none for the arm (ArmCheck: reach, joint limits, singularities); empty: the robot is trusted to.
+  std::function<std::string(const PlannedWay&)> way_fault;
 };
 
 /// A motion as it is about to be sent.
@@ -36,6 +38,7 @@ struct PlannedMotion {
   double length_m = 0.0;
   double speed_m_s = 0.0;  ///< 0: the robot's own
   double force_n = 0.0;    ///< that ends it; 0: the robot's own
+  std::vector<Pose> via;   ///< before the end
 };
 /// For people: "guarded -z 12.0 mm at 50 mm/s until 5 N".
 std::string Describe(const PlannedMotion& motion, const Pose& world_T_tool);
@@ -53,6 +56,7 @@ class CheckedRobot final : public Robot {
   Pose ToolPose() const override { return robot_.ToolPose(); }
   Wrench ContactWrench() const override { return robot_.ContactWrench(); }
   double Time() const override { return robot_.Time(); }
+  std::vector<double> JointPositions() const override { return robot_.JointPositions(); }
   void ZeroWrench() override { robot_.ZeroWrench(); }
   CameraView Look() override { return robot_.Look(); }
   ContactResponse Contact(const Eigen::Vector3d& direction) const override { return robot_.Contact(direction); }

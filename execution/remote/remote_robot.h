@@ -43,6 +43,7 @@ class RemoteRobot final : public Robot {
   Pose ToolPose() const override { return State().world_T_tool; }
   Wrench ContactWrench() const override { return State().wrench; }
   double Time() const override { return State().time_s; }
+  std::vector<double> JointPositions() const override { return State().joints_rad; }
   void ZeroWrench() override;
   MotionResult Transfer(const Pose& world_T_tool) override;
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;

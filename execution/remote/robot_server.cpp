@@ -79,11 +79,13 @@ std::string OutsideOf(const Capabilities& c, const Request& request, const Eigen
 
 RobotServer::RobotServer(ServedRobot served, ServerOptions options)
     : served_(std::move(served)), options_(std::move(options)) {
+  if (served_.slow_transfers) served_.slow_transfers(options_.faults.slowed);
   if (served_.ask_while_moving) served_.ask_while_moving([this] { return WhileMoving(); });
 }
 
 RobotState RobotServer::State() {
-  const RobotState state{served_.robot.Time(), served_.robot.ToolPose(), served_.robot.ContactWrench(), mode_};
+  const RobotState state{served_.robot.Time(), served_.robot.ToolPose(), served_.robot.ContactWrench(), mode_,
+                         served_.robot.JointPositions()};
   if (!options_.lockstep) {
     std::string beat = EncodeReply(form_, 0, StateReply{state});
     const std::lock_guard lock(beat_mutex_);

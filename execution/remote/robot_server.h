@@ -30,6 +30,8 @@ struct ServedRobot {
   std::function<EpisodeReply(std::optional<std::uint64_t>)> begin_episode;
   /// Simulations: the truth about the episode as the world stands.
   std::function<VerdictReply()> judge;
+  /// Simulations: transfers at this much of their speed, from now on (an ordered safety field).
+  std::function<void(double)> slow_transfers;
   /// Simulations: a transfer has ended (the first one of an episode leads to the start pose).
   std::function<void(const MotionResult&)> after_transfer;
 };

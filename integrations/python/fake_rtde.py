@@ -63,6 +63,10 @@ class RTDEReceiveInterface:
         noise = self.world.noise * self.world.random.standard_normal(3) if self.world.noise else 0.0
         return list(self.world.force() + self.world.offset + noise) + [0.0, 0.0, 0.0]
 
+    def getActualQ(self):
+        # Of a gantry that has no turning joints: the double's point moves without an arm.
+        return [0.0] * 6
+
     def getTimestamp(self):
         return time.monotonic() - self.world.begin
 

@@ -4,6 +4,7 @@ A driver has these members; poses are 4x4 numpy arrays base_T_tool, SI units:
 
   name, capabilities          a text, and a dict as in the protocol's `capabilities`
   pose(), wrench(), time()    now; wrench: six numbers, of the world on the tool, base axes
+  joints()                    optional: joint positions, rad, from the base outwards, or None
   zero()                      the present wrench is zero
   protective_stopped()        whether the robot stopped by itself
   recover()                   after a person has looked
@@ -120,8 +121,12 @@ class Server:
         return frame
 
     def _state(self):
-        return {"time_s": float(self.driver.time()), "pose": rows(self.driver.pose()),
-                "wrench": [float(v) for v in self.driver.wrench()], "mode": self.mode}
+        state = {"time_s": float(self.driver.time()), "pose": rows(self.driver.pose()),
+                 "wrench": [float(v) for v in self.driver.wrench()], "mode": self.mode}
+        joints = self.driver.joints() if hasattr(self.driver, "joints") else None
+        if joints is not None:
+            state["joints"] = [float(v) for v in joints]
+        return state
 
     def _beat(self):
         now = time.monotonic()

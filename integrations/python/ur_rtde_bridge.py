@@ -65,6 +65,9 @@ class UrDriver:
     def wrench(self):
         return self.receive.getActualTCPForce()
 
+    def joints(self):
+        return self.receive.getActualQ()
+
     def time(self):
         return self.receive.getTimestamp()
 

@@ -18,7 +18,7 @@ MESSAGES = {
     "PoseStamped": message(header=Space, pose=lambda: Space(position=xyz(), orientation=Space(w=1.0, x=0.0, y=0.0, z=0.0))),
     "WrenchStamped": message(header=Space, wrench=lambda: Space(force=xyz(), torque=xyz())),
     "TwistStamped": message(header=Space, twist=lambda: Space(linear=xyz(), angular=xyz())),
-    "Bool": message(data=bool),
+    "Bool": message(data=bool), "JointState": message(position=list),
 }
 
 

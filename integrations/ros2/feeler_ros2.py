@@ -7,6 +7,7 @@ Topics and services, all by parameters:
   twist   geometry_msgs/TwistStamped   to MoveIt Servo or a Cartesian controller, base axes
   zero    std_srvs/Trigger             of the force sensor
   stop    std_msgs/Bool                the cell's protective stop; true: it stands
+  joints  sensor_msgs/JointState       optional, of the arm alone, in the order from the base outwards
 
   ros2 run ... or: python3 feeler_ros2.py --listen 127.0.0.1:7802 [--token-file FILE] [--ros-args -r pose:=/tcp_pose ...]
 Never run on hardware: the node is exercised against a double of the rclpy calls it makes (fake_ros.py).
@@ -51,6 +52,9 @@ class RosDriver:
         node.create_subscription(messages["PoseStamped"], "pose", self._on_pose, 10)
         node.create_subscription(messages["WrenchStamped"], "wrench", self._on_wrench, 10)
         node.create_subscription(messages["Bool"], "stop", self._on_stop, 10)
+        self._joints = None
+        if "JointState" in messages:
+            node.create_subscription(messages["JointState"], "joints", self._on_joints, 10)
         self.publisher = node.create_publisher(messages["TwistStamped"], "twist", 10)
         self.began = time.monotonic()
 
@@ -67,6 +71,12 @@ class RosDriver:
 
     def _on_stop(self, message):
         self._stopped = bool(message.data)
+
+    def _on_joints(self, message):
+        self._joints = list(message.position)
+
+    def joints(self):
+        return self._joints
 
     def ready(self):
         return self._pose is not None
@@ -191,12 +201,13 @@ def main():
     options, ros_arguments = parser.parse_known_args()
     import rclpy
     from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+    from sensor_msgs.msg import JointState
     from std_msgs.msg import Bool
 
     rclpy.init(args=ros_arguments)
     node = rclpy.create_node("feeler_robot")
     driver = RosDriver(node, {"PoseStamped": PoseStamped, "WrenchStamped": WrenchStamped, "TwistStamped": TwistStamped,
-                              "Bool": Bool})
+                              "Bool": Bool, "JointState": JointState})
     threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
     while not driver.ready():
         time.sleep(0.1)

@@ -28,7 +28,7 @@ namespace {
 using namespace env;  // what the parts are judged with
 using planner::ContactMap;
 
-std::string Read(const std::string& path) {
+std::string TextOf(const std::string& path) {
   std::ifstream file(path);
   std::stringstream text;
   text << file.rdbuf();
@@ -37,7 +37,7 @@ std::string Read(const std::string& path) {
 
 TEST(PipeParts, FilesThatShipAreMadeFromTheDefaultSizes) {
   for (const PartFile& part : GeneratePipeParts({})) {
-    EXPECT_EQ(Read(std::string(FEELER_SOURCE_DIR) + "/models/parts/" + part.name), part.text) << part.name;
+    EXPECT_EQ(TextOf(std::string(FEELER_SOURCE_DIR) + "/models/parts/" + part.name), part.text) << part.name;
   }
 }
 

@@ -15,6 +15,7 @@ execution::Capabilities CapabilitiesOf(const env::SimulatedRobot& robot, const E
   constexpr double kReach_m = 1.5;      // of flange and tool
   constexpr double kPayload_kg = 12.5;  // data sheet of the UR10e
   execution::Capabilities c;
+  c.arm = "ur10e";
   c.motions = {"transfer", "linear", "guarded", "compliant", "twist", "look"};
   c.payload_kg = kPayload_kg;
   c.force_noise_n = faults.robot.force_noise_n;
@@ -37,10 +38,11 @@ ServedEpisodes::ServedEpisodes(EpisodeRunner runner, std::int64_t episodes,
 
 execution::ServedRobot ServedEpisodes::Robot() {
   env::SimulatedRobot& robot = runner_.environment().robot();
-  execution::ServedRobot served{robot, "UR10e, simulated", CapabilitiesOf(robot, runner_.faults()), {}, {}, {}, {}};
+  execution::ServedRobot served{robot, "UR10e, simulated", CapabilitiesOf(robot, runner_.faults()), {}, {}, {}, {}, {}};
   served.ask_while_moving = [&robot](std::function<std::string()> question) {
     robot.SetInterruption(std::move(question));
   };
+  served.slow_transfers = [&robot](double factor) { robot.SlowTransfers(factor); };
   served.begin_episode = [this](std::optional<std::uint64_t> episode) { return Begin(episode); };
   served.judge = [this] { return Judge(); };
   served.after_transfer = [this](const MotionResult& /*result*/) {

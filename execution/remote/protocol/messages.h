@@ -25,6 +25,9 @@ inline constexpr double kHeartbeat_s = 0.02;
 /// A link that was silent for so long is lost.
 inline constexpr double kLinkTimeout_s = 0.1;
 
+/// Joints that a robot may tell of.
+inline constexpr std::size_t kMostJoints = 12;
+
 enum class WireForm { kJson, kNumbers };
 
 enum class RobotMode {
@@ -41,10 +44,12 @@ struct RobotState {
   Pose world_T_tool = Pose::Identity();
   Wrench wrench;
   RobotMode mode = RobotMode::kReady;
+  std::vector<double> joints_rad;  ///< from the base outwards; empty: not told
 };
 
 /// What a robot can do and may do; the executor keeps within it.
 struct Capabilities {
+  std::string arm;                   ///< a description that comes with Feeler (models/robots); empty: not told
   std::vector<std::string> motions;  ///< of transfer, linear, guarded, compliant, twist, look
   double payload_kg = 0.0;           ///< carried at most, gripper and tool included
   double force_noise_n = 0.0;        ///< standard deviation of a force reading

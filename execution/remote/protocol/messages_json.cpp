@@ -29,24 +29,29 @@ json PoseRows(const Pose& pose) {
 
 json StateJson(const RobotState& state) {
   const Wrench& w = state.wrench;
-  return {{"time_s", state.time_s},
-          {"pose", PoseRows(state.world_T_tool)},
-          {"wrench", {w.force_n.x(), w.force_n.y(), w.force_n.z(), w.torque_nm.x(), w.torque_nm.y(), w.torque_nm.z()}},
-          {"mode", ToString(state.mode)}};
+  json item = {
+      {"time_s", state.time_s},
+      {"pose", PoseRows(state.world_T_tool)},
+      {"wrench", {w.force_n.x(), w.force_n.y(), w.force_n.z(), w.torque_nm.x(), w.torque_nm.y(), w.torque_nm.z()}},
+      {"mode", ToString(state.mode)}};
+  if (!state.joints_rad.empty()) item["joints"] = state.joints_rad;
+  return item;
 }
 
 json CapabilitiesJson(const Capabilities& c) {
-  return {{"motions", c.motions},
-          {"payload_kg", c.payload_kg},
-          {"force_noise_n", c.force_noise_n},
-          {"contact_force_n", c.contact_force_n},
-          {"reaction_time_s", c.reaction_time_s},
-          {"effective_mass_kg", c.effective_mass_kg},
-          {"stopping_time_s", c.stopping_time_s},
-          {"max_speed_m_s", c.max_speed_m_s},
-          {"max_force_n", c.max_force_n},
-          {"workspace_min_m", Vector(c.workspace_min_m)},
-          {"workspace_max_m", Vector(c.workspace_max_m)}};
+  json item = {{"motions", c.motions},
+               {"payload_kg", c.payload_kg},
+               {"force_noise_n", c.force_noise_n},
+               {"contact_force_n", c.contact_force_n},
+               {"reaction_time_s", c.reaction_time_s},
+               {"effective_mass_kg", c.effective_mass_kg},
+               {"stopping_time_s", c.stopping_time_s},
+               {"max_speed_m_s", c.max_speed_m_s},
+               {"max_force_n", c.max_force_n},
+               {"workspace_min_m", Vector(c.workspace_min_m)},
+               {"workspace_max_m", Vector(c.workspace_max_m)}};
+  if (!c.arm.empty()) item["arm"] = c.arm;
+  return item;
 }
 
 // What a message has beside `type` and `seq`.
@@ -190,12 +195,14 @@ RobotState StateOf(const json& item) {
        {RobotMode::kWaiting, RobotMode::kReady, RobotMode::kMoving, RobotMode::kProtectiveStop, RobotMode::kFault}) {
     if (ToString(known) == mode) state.mode = known;
   }
+  if (item.contains("joints")) state.joints_rad = item["joints"].get<std::vector<double>>();
   return state;
 }
 
 Capabilities CapabilitiesOf(const json& item) {
   Capabilities c;
   c.motions = item["motions"].get<std::vector<std::string>>();
+  if (item.contains("arm")) c.arm = item["arm"].get<std::string>();
   c.payload_kg = item["payload_kg"].get<double>();
   c.force_noise_n = item["force_noise_n"].get<double>();
   c.contact_force_n = item["contact_force_n"].get<double>();

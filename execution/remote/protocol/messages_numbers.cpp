@@ -59,11 +59,10 @@ class NumberWriter {
     return Put(Eigen::Vector3d(pose.translation())).Put(Eigen::Vector3d(turn.angle() * turn.axis()));
   }
   NumberWriter& Put(const RobotState& state) {
-    return Put(state.time_s)
-        .Put(static_cast<double>(state.mode))
-        .Put(state.world_T_tool)
-        .Put(state.wrench.force_n)
-        .Put(state.wrench.torque_nm);
+    Put(state.time_s).Put(static_cast<double>(state.mode)).Put(state.world_T_tool);
+    Put(state.wrench.force_n).Put(state.wrench.torque_nm);
+    for (const double joint : state.joints_rad) Put(joint);
+    return *this;
   }
   std::string Done() { return text_ + ")"; }
 
@@ -134,6 +133,10 @@ class NumberReader {
     state.world_T_tool = PoseOfSix();
     state.wrench.force_n = Vector();
     state.wrench.torque_nm = Vector();
+    // What is left are the joints: a state is the last thing in a reply.
+    if (numbers_.size() - next_ > kMostJoints) RefuseMessage("has too many numbers");
+    state.joints_rad.assign(numbers_.begin() + static_cast<std::ptrdiff_t>(next_), numbers_.end());
+    next_ = numbers_.size();
     return state;
   }
   void End() const {

@@ -204,6 +204,7 @@ class Controller:
         return {
             "movel": self.movel, "movej": self.movej, "stopl": self.stopl, "sync": self._sync, "sleep": self.sleep,
             "get_inverse_kin": lambda pose: pose, "get_actual_tcp_pose": tcp_pose,
+            "get_actual_joint_positions": lambda: list(self.arm.state["joints"]),
             "get_tcp_force": lambda: list(self.wrench()),
             "force": lambda: float(np.linalg.norm(self.wrench()[:3])),
             "zero_ftsensor": zero, "set_payload": lambda *a: None,

@@ -33,7 +33,7 @@ std::string RobotAlone(const std::string& urdf, bool degrees = false) {
   return printer.CStr();
 }
 
-JointVector RandomJoints(RandomStream& random) {
+JointVector JointsWithinLimits(RandomStream& random) {
   JointVector q;
   for (double& angle : q) angle = random.Uniform(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi);
   return q;
@@ -71,7 +71,7 @@ TEST(Urdf, ForwardKinematicsOfDhUrdfAndMjcfAgree) {
   RandomStream random(1, 0, "urdf");
   double worst = 0.0;
   for (int sample = 0; sample < 500; ++sample) {
-    const JointVector q = RandomJoints(random);
+    const JointVector q = JointsWithinLimits(random);
     for (int i = 0; i < kJointCount; ++i) {
       const int joint = mj_name2id(model.get(), mjOBJ_JOINT, kJointNames[static_cast<std::size_t>(i)]);
       data->qpos[model->jnt_qposadr[joint]] = q[i];

@@ -18,7 +18,7 @@
 namespace feeler::env {
 namespace {
 
-DepthCamera& Camera() {
+DepthCamera& PlugCamera() {
   static DepthCamera camera(PlugScene());
   return camera;
 }
@@ -69,7 +69,7 @@ TEST(DepthCamera, AgreesWithRayCasting) {
     const DataHandle data = Home();
     SetTargetPose(scene, MakePose({0.45 + 0.15 * place, 0.2 * place - 0.2, 0.15 + 0.1 * place}, 0.1 * place), *data);
     mj_forward(scene.model.get(), data.get());
-    const DepthCapture capture = Camera().Exact(*data);
+    const DepthCapture capture = PlugCamera().Exact(*data);
     CopyForDrawing(scene, *data, *drawn);
     std::vector<double> errors;
     int other_geom = 0;
@@ -86,7 +86,7 @@ TEST(DepthCamera, AgreesWithRayCasting) {
       if (depth < 0 || depth > 5.0) continue;
       const auto pixel = static_cast<std::size_t>(v) * 640 + static_cast<std::size_t>(u);
       errors.push_back(std::abs(static_cast<double>(capture.depth.depth_m[pixel]) - depth));
-      other_geom += geom != Camera().geoms()[pixel] ? 1 : 0;
+      other_geom += geom != PlugCamera().geoms()[pixel] ? 1 : 0;
     }
     ASSERT_GT(errors.size(), 2000U);
     EXPECT_LE(Quantile(errors, 0.5), 5e-5) << "metres";
@@ -99,9 +99,9 @@ TEST(DepthCamera, AgreesWithRayCasting) {
 
 TEST(DepthCamera, WithoutNoiseIsExactAndSameStreamSameBits) {
   const DataHandle data = Home();
-  const DepthCapture exact = Camera().Exact(*data);
+  const DepthCapture exact = PlugCamera().Exact(*data);
   RandomStream nothing(1, 0, "depth");
-  EXPECT_EQ(Camera().Noisy(*data, DepthNoiseOptions::Exact(), {}, nothing).depth.depth_m, exact.depth.depth_m);
+  EXPECT_EQ(PlugCamera().Noisy(*data, DepthNoiseOptions::Exact(), {}, nothing).depth.depth_m, exact.depth.depth_m);
 
   const DepthNoiseOptions noise;
   std::vector<float> first;
@@ -223,14 +223,14 @@ TEST(DepthCamera, StaticCameraSeesThePortsInReachPastTheArmAtHome) {
         ++reachable;
         SetTargetPose(scene, port, *data);
         mj_forward(scene.model.get(), data.get());
-        const DepthView view = Camera().View(*data, {});
+        const DepthView view = PlugCamera().View(*data, {});
         int pixels = 0;
-        for (const int geom : Camera().geoms()) {
+        for (const int geom : PlugCamera().geoms()) {
           if (geom >= 0 && scene.drawn_model->geom_bodyid[geom] == scene.target_body &&
               scene.drawn_model->geom_rbound[geom] < 0.06)
             ++pixels;
         }
-        const CameraModel model = Camera().Nominal(*data);
+        const CameraModel model = PlugCamera().Nominal(*data);
         const Eigen::Vector3d p = model.world_T_camera.inverse() * port.translation();
         farthest = std::max(farthest, p.norm());
         // What the housing covers at this distance, were nothing in front of it.

@@ -22,7 +22,7 @@
 namespace feeler::env {
 namespace {
 
-const Scene& PlugScene() {
+const Scene& DrawnPlug() {
   static const Scene scene = BuildScene(LoadTask("plug"));
   return scene;
 }
@@ -50,7 +50,7 @@ class TemporaryFolder {
 };
 
 TEST(Renderer, DepthAgreesWithRayCasting) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = DrawnPlug();
   const DataHandle data = MakeData(*scene.drawn_model);
   ResetScene(scene, scene.home_q_rad, *data);
   Renderer renderer(scene.drawn_model, Small());
@@ -82,7 +82,7 @@ TEST(Renderer, DepthAgreesWithRayCasting) {
 }
 
 TEST(Renderer, SameStateSamePictureAndMotionIsSeen) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = DrawnPlug();
   const DataHandle data = MakeData(*scene.drawn_model);
   ResetScene(scene, scene.home_q_rad, *data);
   const Camera camera = CloseUpCamera(scene);
@@ -104,7 +104,7 @@ TEST(Renderer, SameStateSamePictureAndMotionIsSeen) {
 }
 
 TEST(Renderer, SceneImageShowsTaskOrSaysWhyNot) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = DrawnPlug();
   const Image image = RenderSceneImage(scene, SceneView::kCloseUp, Small());
   EXPECT_EQ(image.rgb.size(), 3U * 320U * 240U);
   EXPECT_THROW(RenderSceneImage(scene, MakePose(Eigen::Vector3d(5, 0, 0)), SceneView::kOverview, Small()), InputError);

@@ -2,13 +2,16 @@
 // says:
 //   - the first probe into it may pass the budget; no later one in its direction does, and other directions stay as
 //   fast;
-//   - a probe into what holds the tool is slower by the masses;
+//   - a probe into what holds the tool is slower by the masses, one that may meet an edge keeps the budget whatever the
+//   normal of the edge;
 //   - after a transfer that met something above the budget, transfers keep within it; before, they go at full speed;
 //   - once the plan has failed, transfers and insertions keep within it.
 #include "feeler/execution/contact/mover.h"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
 #include <vector>
 
 #include "feeler/execution/contact/force_budget.h"
@@ -28,7 +31,11 @@ class HardRobot final : public Robot {
   Wrench ContactWrench() const override { return {}; }
   void ZeroWrench() override {}
   double Time() const override { return time_s_; }
-  ContactResponse Contact(const Eigen::Vector3d& /*direction*/) const override { return contact_; }
+  ContactResponse Contact(const Eigen::Vector3d& direction) const override {
+    ContactResponse contact = contact_;
+    if (stiff_n_m) contact.stiffness_n_m = direction.cwiseAbs2().dot(*stiff_n_m);
+    return contact;
+  }
   MotionResult Transfer(const Pose& goal) override { return Meet(goal, 0.25); }
   MotionResult LinearMove(const Pose& goal, double speed_m_s, double /*force*/) override {
     return Meet(goal, speed_m_s);
@@ -43,6 +50,7 @@ class HardRobot final : public Robot {
   }
 
   std::vector<double> speeds_m_s;
+  std::optional<Eigen::Vector3d> stiff_n_m;  ///< along each axis, between them by the squares of the cosines
 
  private:
   MotionResult Meet(const Pose& goal, double speed_m_s) {
@@ -68,9 +76,9 @@ struct Bench {
     options.force_budget_n = 20.0;
     options.probe_speed_m_s = 1.0;
   }
-  double Probe(Direction direction, bool held = false) {
+  double Probe(Direction direction, const MayMeet& may_meet = {}) {
     Mover mover(robot, frame, options, record, 0.0);  // movers come and go within an episode
-    mover.Probe(direction, mover.position()[AxisOf(direction)] + SignOf(direction) * 2.0, "probe", {}, held);
+    mover.Probe(direction, mover.position()[AxisOf(direction)] + SignOf(direction) * 2.0, "probe", {}, may_meet);
     return record.moves.back().peak_force_n;
   }
   HardRobot robot;
@@ -100,9 +108,24 @@ TEST(Mover, WhatHoldsTheToolIsMetSlower) {
   Bench bench(1.0);
   bench.Probe(Direction::kPlusX);
   const double free_m_s = bench.robot.speeds_m_s.back();
-  bench.Probe(Direction::kPlusX, true);
+  bench.Probe(Direction::kPlusX, {.long_wall = true, .edge_towards = {}});
   const ContactResponse told = bench.robot.Contact(Eigen::Vector3d::UnitX());
   EXPECT_NEAR(free_m_s / bench.robot.speeds_m_s.back(), told.held_mass_kg / told.mass_kg(), 1e-9);
+}
+
+TEST(Mover, AnEdgeIsMetSlowEnoughForEveryNormal) {
+  // Stiff along z, soft across: what an edge between them pushes with is between, by the angle of its normal.
+  Bench bench(1.0);
+  bench.robot.stiff_n_m = Eigen::Vector3d(2e4, 2e4, 4e5);
+  bench.Probe(Direction::kPlusX);
+  const double face_m_s = bench.robot.speeds_m_s.back();
+  bench.Probe(Direction::kPlusX, {.long_wall = false, .edge_towards = Eigen::Vector3d::UnitZ()});
+  const double edge_m_s = bench.robot.speeds_m_s.back();
+  EXPECT_LT(edge_m_s, face_m_s);
+  for (double angle = 0.0; angle < 1.55; angle += 0.01) {
+    const Eigen::Vector3d normal(std::cos(angle), 0.0, std::sin(angle));
+    EXPECT_LE(std::cos(angle) * edge_m_s * ForcePerSpeed(bench.robot.Contact(normal)), 20.0) << angle;
+  }
 }
 
 TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {

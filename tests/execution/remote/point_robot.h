@@ -32,7 +32,7 @@ class PointRobot final : public Robot {
   }
 
   ServedRobot Served() {
-    ServedRobot served{*this, "point", {}, {}, {}, {}, {}};
+    ServedRobot served{*this, "point", {}, {}, {}, {}, {}, {}};
     served.capabilities.motions = {"transfer", "linear", "guarded", "compliant"};
     served.capabilities.max_speed_m_s = 1.0;
     served.ask_while_moving = [this](std::function<std::string()> question) { question_ = std::move(question); };

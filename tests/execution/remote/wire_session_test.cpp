@@ -413,7 +413,7 @@ TEST(WireChecks, AMotionOutsideOfTheLimitsIsNotSent) {
                 },
                 down),
             "");
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.way_fault = [](const Pose&, const Pose&) { return "singular"; }; }, down)
+  EXPECT_NE(refusal([](SafetyLimits& l) { l.way_fault = [](const PlannedWay&) { return "singular"; }; }, down)
                 .find("singular"),
             std::string::npos);
   const auto through = [](Robot& robot) {

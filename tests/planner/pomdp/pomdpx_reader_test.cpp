@@ -174,7 +174,7 @@ TEST(PomdpxReader, TheValueIsThatOfTheFlatModel) {
   EXPECT_NEAR(a.value_lower, std::max(10.0, g * g * (0.5 * good + 0.5 * bad)), 1e-5);
 }
 
-std::string ErrorOf(const std::string& text) {
+std::string PomdpxErrorOf(const std::string& text) {
   try {
     ParsePomdpx(text, "file");
   } catch (const InputError& error) {
@@ -215,20 +215,20 @@ TEST(PomdpxReader, MalformedFilesNameTheLine) {
       {Without(good, "0.95", "1.0"), "file:3: a discount of 1"},
   };
   for (const auto& [text, error] : cases) {
-    EXPECT_THAT(ErrorOf(text), testing::HasSubstr(error));
-    EXPECT_TRUE(ErrorOf(text).starts_with("file:")) << ErrorOf(text);
-    EXPECT_EQ(ErrorOf(text).find('\n'), std::string::npos);
+    EXPECT_THAT(PomdpxErrorOf(text), testing::HasSubstr(error));
+    EXPECT_TRUE(PomdpxErrorOf(text).starts_with("file:")) << PomdpxErrorOf(text);
+    EXPECT_EQ(PomdpxErrorOf(text).find('\n'), std::string::npos);
   }
 }
 
 TEST(PomdpxReader, NoPrefixOrFlippedByteCrashes) {
   const std::string good = Rover(kDiagramTransitions, kTableSensor);
-  for (std::size_t length = 0; length < good.size(); length += 37) ErrorOf(good.substr(0, length));
+  for (std::size_t length = 0; length < good.size(); length += 37) PomdpxErrorOf(good.substr(0, length));
   RandomStream random(1, 0, "flips");
   for (int i = 0; i < 500; ++i) {
     std::string text = good;
     for (int k = 0; k < 2; ++k) text[random.Index(text.size())] = static_cast<char>(random.Index(128));
-    ErrorOf(text);
+    PomdpxErrorOf(text);
   }
 }
 

@@ -69,7 +69,7 @@ TEST(PolicyFile, HasExactlyTheKeysOfTheFormat) {
   EXPECT_THAT(leaves, testing::UnorderedElementsAre(0, 1, 2, 3, 4, 5));
 }
 
-json Sample() {
+json SamplePolicy() {
   return json::parse(R"({"task":"t","start":[0,0,0],"expected_cost":1.5,"lower_bound":1.25,"root":0,
     "hypotheses":[[0,0,0],[1,0,0],[2,0,0]],
     "nodes":[{"move":{"direction":"+x","cells":4},"outcomes":[{"cells":2,"contact":true,"next":1},
@@ -91,7 +91,7 @@ std::string ErrorOf(const json& file) {
 }
 
 TEST(PolicyFile, NamesEachBrokenLaw) {
-  ASSERT_NO_THROW(ParsePolicyFile(Sample().dump(), "p.json"));
+  ASSERT_NO_THROW(ParsePolicyFile(SamplePolicy().dump(), "p.json"));
   const std::vector<std::pair<const char*, std::function<void(json&)>>> cases = {
       {"p.json: \"task\" is missing", [](json& j) { j.erase("task"); }},
       {"unknown key \"author\"", [](json& j) { j["author"] = 1; }},
@@ -130,14 +130,14 @@ TEST(PolicyFile, NamesEachBrokenLaw) {
       {"nodes[4]: has the unknown key \"move\"", [](json& j) { j["nodes"][4]["move"] = 1; }},
   };
   for (const auto& [text, breaks] : cases) {
-    json broken = Sample();
+    json broken = SamplePolicy();
     breaks(broken);
     EXPECT_THAT(ErrorOf(broken), HasSubstr(text));
   }
 }
 
 TEST(PolicyFile, SurvivesTwentyThousandMutations) {
-  const std::string whole = Sample().dump();
+  const std::string whole = SamplePolicy().dump();
   int accepted = 0;
   for (std::uint64_t episode = 0; episode < 20000; ++episode) {
     RandomStream random(1, episode, "mutation");

@@ -8,16 +8,10 @@
 #include <map>
 
 #include "feeler/core/error.h"
+#include "tests/workflow/episode/three_axis_task.h"
 
 namespace feeler::workflow {
 namespace {
-
-Task ThreeAxisTask() {
-  Task task;
-  task.axes = {{AxisKind::kX}, {AxisKind::kY}, {AxisKind::kZ}};
-  task.world_T_target = MakePose({0.6, 0.1, 0.2}, 0.3);
-  return task;
-}
 
 TEST(DrawEpisode, IsAPureFunctionOfItsKey) {
   const Task task = ThreeAxisTask();

@@ -18,6 +18,7 @@
 #include "feeler/execution/recovery/online_planner.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_draw.h"
+#include "tests/workflow/episode/three_axis_task.h"
 
 namespace feeler::workflow {
 namespace {
@@ -43,13 +44,6 @@ TEST(ParseFaults, CombinesNamesAndRefusesContradictions) {
   for (const char* bad : {"", "loud", "yaw-1,yaw-2", "outside,fall-in", "friction,friction", "ideal,"}) {
     EXPECT_THROW(ParseFaults(bad), InputError) << bad;
   }
-}
-
-Task ThreeAxisTask() {
-  Task task;
-  task.axes = {{AxisKind::kX}, {AxisKind::kY}, {AxisKind::kZ}};
-  task.world_T_target = MakePose({0.6, 0.1, 0.2}, 0.3);
-  return task;
 }
 
 TEST(DrawEpisode, OutsideIsBeyondOneSideOfTheBox) {

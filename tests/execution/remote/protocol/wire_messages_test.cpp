@@ -27,6 +27,7 @@ RobotState SomeState() {
   state.world_T_tool = SomePose();
   state.wrench = {Eigen::Vector3d(0.1, 0.2, -1.0 / 3.0), Eigen::Vector3d(1e-3, 0.0, -2e-3)};
   state.mode = RobotMode::kMoving;
+  state.joints_rad = {0.1, -1.0 / 3.0, 2.0, 0.0, -1.5, 3.0};
   return state;
 }
 
@@ -60,6 +61,7 @@ std::vector<Reply> SomeReplies() {
   WelcomeReply welcome;
   welcome.robot = "a \"robot\"";
   welcome.capabilities.motions = {"transfer", "guarded"};
+  welcome.capabilities.arm = "ur10e";
   welcome.state = SomeState();
   ResultReply result;
   result.result = {StopReason::kContact, 1.0 / 3.0, true, 5.5, SomePose(), ""};
@@ -134,6 +136,10 @@ TEST(WireMessages, NumbersKeepANanometre) {
     }
     const Framed<Reply> back = DecodeReply(WireForm::kNumbers, EncodeReply(WireForm::kNumbers, ++seq, reply));
     EXPECT_EQ(back.body.index(), reply.index());
+    if (const auto* state = std::get_if<StateReply>(&back.body)) {
+      ASSERT_EQ(state->state.joints_rad.size(), SomeState().joints_rad.size());
+      EXPECT_NEAR(state->state.joints_rad[1], SomeState().joints_rad[1], 1e-9);
+    }
   }
   std::mt19937 random(3);
   std::normal_distribution<double> normal;

@@ -1,11 +1,11 @@
-#include "feeler/env/mjcf/plain_locale.h"
+#include "feeler/core/plain_locale.h"
 
 #include <locale>
 #include <mutex>
 #include <optional>
 #include <string>
 
-namespace feeler::env {
+namespace feeler {
 namespace {
 
 /// The global locale is one for all threads: the first in puts the plain one, the last out puts the host's back.
@@ -49,4 +49,4 @@ PlainLocale::~PlainLocale() {
   if (plain_ != locale_t{}) freelocale(plain_);
 }
 
-}  // namespace feeler::env
+}  // namespace feeler

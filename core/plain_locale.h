@@ -2,7 +2,7 @@
 
 #include <clocale>
 
-namespace feeler::env {
+namespace feeler {
 
 /// While one lives, this thread reads and writes numbers with a point, whatever locale the program has set: by
 /// setlocale (that of the thread gives way to "C") or as the global C++ locale, which streams take over when they are
@@ -19,4 +19,4 @@ class PlainLocale {
   locale_t before_;
 };
 
-}  // namespace feeler::env
+}  // namespace feeler
