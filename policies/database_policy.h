@@ -17,6 +17,7 @@ class DatabasePolicy final : public Policy {
   explicit DatabasePolicy(std::shared_ptr<const planner::PolicyGraph> policy);
 
   std::string_view name() const override { return "database"; }
+  bool reads_hypotheses() const override { return false; }
   void Begin(const planner::Problem& problem) override;
   Decision Next(const Belief& belief) override;
   bool Observe(const Outcome& outcome) override;

@@ -11,6 +11,7 @@ namespace feeler::policies {
 class OpenLoopPolicy final : public Policy {
  public:
   std::string_view name() const override { return "open-loop"; }
+  bool reads_hypotheses() const override { return false; }
   void Begin(const planner::Problem& /*problem*/) override {}
   Decision Next(const Belief& /*belief*/) override { return Insert{.confirm = false}; }
   bool Observe(const Outcome& /*outcome*/) override { return false; }

@@ -73,6 +73,10 @@ class Policy {
   /// What to do in this belief: its hypotheses are consistent with every outcome observed since Begin.
   virtual Decision Next(const Belief& belief) = 0;
 
+  /// Whether Next looks at the hypotheses of the belief. Those who carry out a policy that does not hand it none of
+  /// them: no belief is copied for nobody.
+  virtual bool reads_hypotheses() const { return true; }
+
   /// Tells the outcome, in lattice terms, that the executor settled on for the move last returned by Next. False when
   /// the policy holds no plan for that outcome; it is then as before the call and may be told another outcome.
   virtual bool Observe(const Outcome& outcome) = 0;

@@ -43,7 +43,7 @@ struct Tally {
 void Count(const ExecutedEpisode& episode, Tally& tally) {
   ++tally.episodes;
   tally.links_lost += episode.link_lost ? 1 : 0;
-  tally.believed_inserted += episode.execution.inserted ? 1 : 0;
+  tally.believed_inserted += episode.execution.believed_inserted ? 1 : 0;
   tally.peak_force_n = std::max(tally.peak_force_n, episode.line.peak_force_n);
   tally.robot_time_s += episode.execution.sim_time_s;
   tally.clock_s += episode.robot_s;
@@ -52,7 +52,7 @@ void Count(const ExecutedEpisode& episode, Tally& tally) {
   tally.judged += judged ? 1 : 0;
   tally.localized += episode.line.localized.value_or(false) ? 1 : 0;
   tally.inserted += episode.line.inserted.value_or(false) ? 1 : 0;
-  if (judged ? *episode.line.inserted : episode.execution.inserted) {
+  if (judged ? *episode.line.inserted : episode.execution.believed_inserted) {
     tally.times_s.push_back(episode.execution.sim_time_s);
   } else {
     ++tally.failures[episode.line.reason.substr(0, episode.line.reason.find(':'))];

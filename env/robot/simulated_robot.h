@@ -68,26 +68,31 @@ struct TwistReference {
   Vector6 twist = Vector6::Zero();  ///< of the tool origin, world axes, linear first
 };
 
-/// Everything that later calls depend on: restored, the robot goes on bit for bit.
-struct RobotState {
-  WorldState world;
+/// What the robot remembers from step to step and from motion to motion.
+struct RobotMemory {
   NoiseOptions noise;
   ContactSensor sensor;
   FrictionObserver friction;
-  RobotStatistics statistics;
-  std::vector<Pose> target_candidates;
+  RobotStatistics statistics{};
+  std::vector<Pose> target_candidates{};
   std::uint64_t transfer_seed = 0;
   RandomStream encoder_random;
-  JointVector encoder_offset = JointVector::Zero();
-  JointVector deflection = JointVector::Zero();
-  JointVector measured_q = JointVector::Zero();
-  Eigen::Matrix3d held_orientation = Eigen::Matrix3d::Identity();
-  std::optional<Pose> set_point;
-  Pose tool_at_sensing = Pose::Identity();
-  double peak_force_n = 0.0;
-  double deadline_s = 0.0;
   RandomStream image_random;
-  std::optional<TwistReference> twist_reference;
+  JointVector encoder_offset = JointVector::Zero();
+  JointVector deflection = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
+  JointVector measured_q = JointVector::Zero();
+  Eigen::Matrix3d held_orientation = Eigen::Matrix3d::Identity();  ///< what guarded moves hold
+  std::optional<Pose> set_point{};                                 ///< of Servo
+  Pose tool_at_sensing = Pose::Identity();  ///< measured pose in the state that the sensor describes
+  double peak_force_n = 0.0;                ///< exact, since the motion began
+  double deadline_s = std::numeric_limits<double>::infinity();
+  std::optional<TwistReference> twist_reference{};
+};
+
+/// Everything that later calls depend on: restored, the robot goes on bit for bit.
+struct RobotState {
+  WorldState world;
+  RobotMemory robot;
 };
 
 /// The UR10e in MuJoCo behind the robot interface.
@@ -113,10 +118,12 @@ class SimulatedRobot : public Robot {
 
   // Robot:
   Pose ToolPose() const override;
-  Wrench ContactWrench() const override { return sensor_.filtered(); }
+  Wrench ContactWrench() const override { return memory_.sensor.filtered(); }
   void ZeroWrench() override;
   double Time() const override { return world_.time_s(); }
-  std::vector<double> JointPositions() const override { return {measured_q_.data(), measured_q_.data() + kJointCount}; }
+  std::vector<double> JointPositions() const override {
+    return {memory_.measured_q.data(), memory_.measured_q.data() + kJointCount};
+  }
   MotionResult Transfer(const Pose& world_T_tool) override;
   MotionResult LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) override;
   MotionResult Guarded(const GuardedMotion& motion) override;
@@ -141,12 +148,12 @@ class SimulatedRobot : public Robot {
   void Restore(const RobotState& state);
 
   /// As measured by the encoders.
-  const JointVector& q_rad() const { return measured_q_; }
+  const JointVector& q_rad() const { return memory_.measured_q; }
   JointVector qd_rad_s() const { return world_.qd_rad_s(); }
   const World& world() const { return world_; }
-  const ContactSensor& sensor() const { return sensor_; }
-  const NoiseOptions& noise() const { return noise_; }
-  const RobotStatistics& statistics() const { return statistics_; }
+  const ContactSensor& sensor() const { return memory_.sensor; }
+  const NoiseOptions& noise() const { return memory_.noise; }
+  const RobotStatistics& statistics() const { return memory_.statistics; }
   const RobotOptions& options() const { return options_; }
 
   /// Where the target may stand, as far as the robot knows: transfers keep clear of all of these. At least one; the
@@ -155,7 +162,7 @@ class SimulatedRobot : public Robot {
   /// Transfers take their joint speed times this, above 0 to 1 (a safety field slows the arm).
   void SlowTransfers(double factor) { transfer_speed_ = factor; }
   /// Motions end with kTimeLimit once Time() reaches it.
-  void SetDeadline(double time_s) { deadline_s_ = time_s; }
+  void SetDeadline(double time_s) { memory_.deadline_s = time_s; }
   /// Asked after every physics step of a motion: a text brings the arm to rest, and the motion ends with kAborted and
   /// that text. Empty: nobody is asked. Asking changes nothing.
   void SetInterruption(std::function<std::string()> interruption) { interruption_ = std::move(interruption); }
@@ -163,7 +170,12 @@ class SimulatedRobot : public Robot {
   void SetObserver(std::function<void(const World&)> observer, double period_s);
 
  private:
-  struct Watch;
+  /// What ends a motion early.
+  struct Watch {
+    double tool_force_n = std::numeric_limits<double>::infinity();
+    Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of the motion; zero where it has none
+    bool protective = false;                              ///< a contact is a protective stop, not the purpose
+  };
   using ReferenceAt = std::function<std::optional<JointReference>(double time_s)>;
   using TorqueAt = std::function<JointVector(double time_s)>;
 
@@ -196,26 +208,10 @@ class SimulatedRobot : public Robot {
   RobotOptions options_;
   std::shared_ptr<const Scene> scene_;
   World world_;
-  NoiseOptions noise_;
-  ContactSensor sensor_;
-  FrictionObserver friction_;
-  RobotStatistics statistics_;
-  std::vector<Pose> target_candidates_;
-  std::uint64_t transfer_seed_ = 0;
+  RobotMemory memory_;
+  ToolFrame frame_;                                    ///< of the tool, at memory_.measured_q
   std::unique_ptr<TransferChecker> transfer_checker_;  ///< made when first needed
   std::unique_ptr<WristCamera> wrist_camera_;          ///< made when first needed
-  RandomStream image_random_{0, 0, "image"};
-  std::optional<TwistReference> twist_reference_;
-  RandomStream encoder_random_{0, 0, "encoder"};
-  JointVector encoder_offset_ = JointVector::Zero();
-  JointVector deflection_ = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
-  JointVector measured_q_ = JointVector::Zero();
-  ToolFrame frame_;                                                 ///< of the tool, at measured_q_
-  Eigen::Matrix3d held_orientation_ = Eigen::Matrix3d::Identity();  ///< what guarded moves hold
-  std::optional<Pose> set_point_;                                   ///< of Servo
-  Pose tool_at_sensing_ = Pose::Identity();  ///< measured pose in the state that the sensor describes
-  double peak_force_n_ = 0.0;                ///< exact, since the motion began
-  double deadline_s_ = std::numeric_limits<double>::infinity();
   double transfer_speed_ = 1.0;
   std::function<std::string()> interruption_;
   std::function<void(const World&)> observer_;

@@ -1,4 +1,4 @@
-// What SimulatedRobot does at the rate of a controller or a camera: the picture, one step of an integrated twist, the
+// What SimulatedRobot does at the rate of a controller or a camera: the picture, what a contact would be like, the
 // low-level step of learners, the zero of the wrench.
 #include <fmt/format.h>
 
@@ -21,7 +21,7 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 
 CameraView SimulatedRobot::Look() {
   if (!wrist_camera_) wrist_camera_ = std::make_unique<WristCamera>(scene_, options_.wrist_camera);
-  return wrist_camera_->Look(world_.data(), &image_random_);
+  return wrist_camera_->Look(world_.data(), &memory_.image_random);
 }
 
 ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const {
@@ -45,8 +45,8 @@ ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const 
   const Matrix6 inertia = mobility.inverse();
   contact.held_mass_kg = 1.0 / direction.dot(inertia.topLeftCorner<3, 3>().ldlt().solve(direction));
   contact.free_mass_kg = 1.0 / direction.dot(mobility.topLeftCorner<3, 3>() * direction);
-  contact.force_noise_n = noise_.force_noise_n;
-  contact.reaction_time_s = 2.0 * world_.timestep_s() + noise_.force_delay_s;
+  contact.force_noise_n = memory_.noise.force_noise_n;
+  contact.reaction_time_s = 2.0 * world_.timestep_s() + memory_.noise.force_delay_s;
   if (!std::isfinite(time_constant_s)) return contact;
   const double stiffness = 1.0 / std::pow(largest_impedance * time_constant_s * damping_ratio, 2);  // per kg
   const double damping = 2.0 / (largest_impedance * time_constant_s);
@@ -54,54 +54,14 @@ ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const 
   contact.damping_ratio = damping / (2.0 * std::sqrt(stiffness));
   // While a late sensor says nothing the drive presses on: the reference of the held mass runs ahead, and by then the
   // contact has taken the speed. Told as a longer reaction of the parts alone.
-  if (noise_.force_delay_s > 0.0) {
-    const double delay_s = noise_.force_delay_s;
+  if (memory_.noise.force_delay_s > 0.0) {
+    const double delay_s = memory_.noise.force_delay_s;
     const double bandwidth = options_.tracking.bandwidth_rad_s;
     const double ahead = bandwidth * bandwidth * delay_s;  // per kg and m/s
     const double stopped = 2.0 * options_.tracking.damping_ratio * bandwidth * (1.0 - std::exp(-damping * delay_s));
     contact.reaction_time_s += contact.held_mass_kg * (ahead + stopped) / contact.stiffness_n_m;
   }
   return contact;
-}
-
-std::optional<JointReference> SimulatedRobot::Advance(const Vector6& wanted, TwistReference& reference,
-                                                      JointVector& q) const {
-  const double dt = world_.timestep_s();
-  // The velocity changes as fast as the robot's acceleration allows, linear and angular each along a straight line.
-  const auto approach = [&](Eigen::Index part, double acceleration) {
-    const Eigen::Vector3d change = wanted.segment<3>(part) - reference.twist.segment<3>(part);
-    const double most = acceleration * dt;
-    reference.twist.segment<3>(part) +=
-        change.norm() > most ? Eigen::Vector3d(change * (most / change.norm())) : change;
-  };
-  approach(0, options_.acceleration_m_s2);
-  approach(3, options_.angular_acceleration_rad_s2);
-  const Eigen::PartialPivLU<Matrix6> jacobian(ToolJacobian(*scene_, q));
-  JointVector speed = jacobian.solve(reference.twist);
-  if (!speed.allFinite()) return std::nullopt;
-  const double excess = speed.cwiseAbs().cwiseQuotient(scene_->velocity_limit_rad_s).maxCoeff();
-  if (excess > 1.0) {
-    reference.twist /= excess;
-    speed /= excess;
-  }
-  Pose next = reference.world_T_tool;
-  next.translation() += dt * reference.twist.head<3>();
-  const double turn = dt * reference.twist.tail<3>().norm();
-  if (turn > 0.0) next.linear() = Eigen::AngleAxisd(turn, reference.twist.tail<3>().normalized()) * next.linear();
-  JointVector there = q;
-  if (!SolveNearby(*scene_, next, there)) return std::nullopt;
-  const mjModel& model = *scene_->model;
-  for (int i = 0; i < kJointCount; ++i) {
-    const int joint = scene_->joint[static_cast<std::size_t>(i)];
-    const mjtNum* range = model.jnt_range + 2 * joint;
-    if (model.jnt_limited[joint] != 0 && (there[i] < range[0] || there[i] > range[1])) return std::nullopt;
-  }
-  reference.world_T_tool = next;
-  q = there;
-  JointReference result;
-  result.q_rad = q;
-  result.qd_rad_s = speed;
-  return result;
 }
 
 MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const ImpedanceGains& gains) {
@@ -111,7 +71,7 @@ MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const Impeda
     constexpr double kLeash_m = 0.02;
     constexpr double kLeash_rad = 0.1;
     const Pose start = ToolPose();
-    Pose set_point = set_point_.value_or(start);
+    Pose set_point = memory_.set_point.value_or(start);
     set_point.translation() += delta.head<3>();
     const double turn = delta.tail<3>().norm();
     if (turn > 0) set_point.linear() = Eigen::AngleAxisd(turn, delta.tail<3>() / turn) * set_point.linear();
@@ -123,19 +83,19 @@ MotionResult SimulatedRobot::Servo(const Vector6& delta, int steps, const Impeda
     set_point.linear() = start.linear();
     if (angle > 0) set_point.linear() = Eigen::AngleAxisd(angle, stretch.tail<3>() / angle) * start.linear();
 
-    set_point_ = set_point;
-    held_orientation_ = set_point.linear();
+    memory_.set_point = set_point;
+    memory_.held_orientation = set_point.linear();
     PosePoint reference;
     reference.pose = set_point;
     MotionResult result;
     for (int i = 0; i < steps; ++i) {
-      if (world_.time_s() >= deadline_s_) {
+      if (world_.time_s() >= memory_.deadline_s) {
         result.reason = StopReason::kTimeLimit;
         break;
       }
       StepOnce(CartesianImpedance(world_, frame_, world_.qd_rad_s(), reference, gains));
     }
-    result.contact = sensor_.ToolFlag();
+    result.contact = memory_.sensor.ToolFlag();
     result.world_T_tool = ToolPose();
     result.travelled_m = (result.world_T_tool.translation() - start.translation()).norm();
     return result;
@@ -151,13 +111,13 @@ void SimulatedRobot::ZeroWrench() {
   try {
     for (int i = 0; i < steps; ++i) {
       TrackStep(here);
-      mean.force_n += sensor_.raw().force_n / steps;
-      mean.torque_nm += sensor_.raw().torque_nm / steps;
+      mean.force_n += memory_.sensor.raw().force_n / steps;
+      mean.torque_nm += memory_.sensor.raw().torque_nm / steps;
     }
   } catch (const WorldError&) {
     return;  // the next motion reports it
   }
-  sensor_.Shift(mean);
+  memory_.sensor.Shift(mean);
 }
 
 }  // namespace feeler::env

@@ -44,8 +44,8 @@ struct LadderRecord {
 
 /// What happened from the start pose to the verdict, as the executor knows it: nothing here comes from the true pose.
 struct ExecutionRecord {
-  bool localized = false;                ///< believed: the target pose is known within the tolerance of the task
-  bool inserted = false;                 ///< believed: at depth, and laterally where the estimate says the opening is
+  bool believed_localized = false;       ///< the target pose is known within the tolerance of the task
+  bool believed_inserted = false;        ///< at depth, and laterally where the estimate says the opening is
   std::string reason;                    ///< "inserted", or precisely why not
   std::optional<Pose> world_T_estimate;  ///< final estimate of the target pose; empty if it was never localized
   std::array<double, 3> half_width_m{};  ///< of the estimate, per axis, as the evidence leaves it

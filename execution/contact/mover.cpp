@@ -138,7 +138,8 @@ double Mover::SpeedOfProbe(const Eigen::Vector3d& direction, const ContactRespon
   double speed_m_s = SpeedWithinBudget(face, options_.force_budget_n);
   if (!may_meet.edge_towards) return speed_m_s;
   const Eigen::Vector3d towards = frame_.world_T_estimate.linear() * *may_meet.edge_towards;
-  // The normal of an edge turns from one face to the other; the tool comes along it with the cosine of its speed.
+  speed_m_s = std::min(speed_m_s, SpeedOverEdge(face, robot_.Contact(towards), options_.force_budget_n));
+  // The normal of an edge cut is between the faces; the tool comes along it with the cosine of its speed.
   constexpr int kNormals = 5;
   for (int i = 1; i <= kNormals; ++i) {
     const double angle = 0.5 * std::numbers::pi * i / (kNormals + 1);

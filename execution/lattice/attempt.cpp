@@ -78,12 +78,12 @@ void SearchAndInsert(const Episode& episode, const planner::ContactMap& map, con
     return;
   }
   attempt.target = found->target;
-  record.localized = true;
+  record.believed_localized = true;
   record.world_T_estimate = attempt.frame.ToWorld(found->target);
   const double farthest_inside = FarthestInside(task, map, attempt.orientation, task.cell_m);
   const BelievedInsertion verdict = found->at_bottom ? BelievedInsertion{true, false, "inserted"}
                                                      : InsertFromHere(task, found->target, farthest_inside, mover);
-  record.inserted = verdict.inserted;
+  record.believed_inserted = verdict.inserted;
   attempt.reason = verdict.reason;
   attempt.end = verdict.inserted ? AttemptEnd::kInserted : AttemptEnd::kBlocked;
 }
@@ -116,12 +116,12 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
   const policies::Insert& insert = *wanted;
   if (insert.tool_T_target) {
     attempt.target = mover.Locate(*insert.tool_T_target);
-    record.localized = true;
+    record.believed_localized = true;
   } else if (localizer.found_inside()) {
     attempt.target = localizer.found_inside();
     attempt.sure = true;
     record.fell_in = true;
-    record.localized = true;
+    record.believed_localized = true;
   } else if (insert.confirm) {
     const TargetFit fit = Confirm(*problem.map, task.insertion, attempt.orientation,
                                   LikelyRegion(left, attempt.possible), attempt.possible, mover, attempt.evidence);
@@ -134,7 +134,7 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
 
   const BelievedInsertion verdict =
       ApproachAndInsert(task, *problem.map, *attempt.target, attempt.orientation, mover, attempt.evidence);
-  record.inserted = verdict.inserted;
+  record.believed_inserted = verdict.inserted;
   attempt.reason = verdict.reason;
   attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
 }
@@ -177,7 +177,7 @@ void RecordEstimate(const Episode& episode, const LatticeFrame& frame, const Tar
     const auto i = static_cast<std::size_t>(axis);
     record.half_width_m[i] = fit.pinned[i] ? 0.0 : fit.half_width[axis] * frame.cell_m;
   }
-  record.localized = true;
+  record.believed_localized = true;
   record.world_T_estimate = frame.ToWorld(fit.position);
 }
 

@@ -51,6 +51,7 @@ Localizer::Localizer(const Task& task, const planner::Problem& problem, policies
 policies::Belief Localizer::View() const {
   policies::Belief belief;
   belief.robot = robot_;
+  if (!policy_.reads_hypotheses()) return belief;
   for (const TrackedHypothesis& t : tracked_) belief.hypotheses.push_back(t.hypothesis);
   return belief;
 }

@@ -57,7 +57,9 @@ policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt, const std::funct
   while (true) {
     policies::Belief belief;
     belief.robot = robot_;
-    for (const Tracked& t : tracked_) belief.hypotheses.push_back(t.hypothesis);
+    if (policy_.reads_hypotheses()) {
+      for (const Tracked& t : tracked_) belief.hypotheses.push_back(t.hypothesis);
+    }
     const policies::Decision decision = CallPolicy(record_, [&] { return policy_.Next(belief); });
     const auto* move = std::get_if<GuardedMove>(&decision);
     if (move == nullptr || tracked_.size() == 1) {

@@ -80,7 +80,7 @@ class PoseAttempt {
       episode_.record.world_T_estimate =
           frame_.world_T_estimate * ToPose(walk.Mean([&](const auto& h) { return PoseOf(h); }));
       const BelievedInsertion verdict = Insert(*episode_.record.world_T_estimate);
-      episode_.record.inserted = verdict.inserted;
+      episode_.record.believed_inserted = verdict.inserted;
       return verdict.reason;
     }
 
@@ -89,12 +89,12 @@ class PoseAttempt {
       const Knowledge knowledge = Localize(insertion == 0 ? kLeastTouches : kLeastTouches + 1);
       const PoseVector pose = knowledge.fits.front().pose;
       ExecutionRecord& record = episode_.record;
-      record.localized = true;
+      record.believed_localized = true;
       record.world_T_estimate = frame_.world_T_estimate * ToPose(pose);
       if (insertion == 0) record.localization_time_s = episode_.robot.Time() - episode_.started_s;
       if (insertion > 0) record.ladder.push_back({"touch again", reason});
       const BelievedInsertion verdict = Insert(*record.world_T_estimate);
-      record.inserted = verdict.inserted;
+      record.believed_inserted = verdict.inserted;
       reason = verdict.reason;
       if (verdict.inserted || !episode_.options.ladder) return reason;
     }

@@ -112,7 +112,7 @@ ordered_json ToJson(const EpisodeLine& line, const ExecutionRecord& execution) {
   json["inserted"] = OrNull(line.inserted);
   json["reason"] = line.reason;
   json["believed"] = {
-      {"localized", execution.localized}, {"inserted", execution.inserted}, {"reason", execution.reason}};
+      {"localized", execution.believed_localized}, {"inserted", execution.believed_inserted}, {"reason", execution.reason}};
   json["moves"] = ordered_json::array();
   for (const MoveRecord& move : execution.moves) json["moves"].push_back(MoveJson(move));
   json["policy_moves"] = execution.policy_moves;

@@ -10,7 +10,7 @@ namespace feeler::execution {
 /// The reason of a record once the truth is known: "inserted", or why not. `verdict`: that of the judge.
 inline std::string ScoredReason(bool inserted, const std::string& verdict, const ExecutionRecord& execution) {
   if (inserted) return "inserted";
-  return execution.inserted ? "believed inserted, but " + verdict : execution.reason;
+  return execution.believed_inserted ? "believed inserted, but " + verdict : execution.reason;
 }
 
 /// The reason of a record whose way to the start pose did not end there.

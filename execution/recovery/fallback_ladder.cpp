@@ -63,8 +63,8 @@ Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
 void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
               const BelievedInsertion& verdict, Attempt& attempt) {
   episode.record.world_T_estimate = frame.ToWorld(target);
-  episode.record.localized = true;
-  episode.record.inserted = verdict.inserted;
+  episode.record.believed_localized = true;
+  episode.record.believed_inserted = verdict.inserted;
   attempt.reason = verdict.reason;
   attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
 }

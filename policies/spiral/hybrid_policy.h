@@ -19,6 +19,7 @@ class HybridPolicy final : public Policy {
   std::string_view name() const override { return "hybrid"; }
   void Begin(const planner::Problem& problem) override;
   Decision Next(const Belief& belief) override { return chosen_->Next(belief); }
+  bool reads_hypotheses() const override { return chosen_->reads_hypotheses(); }
   bool Observe(const Outcome& outcome) override { return chosen_->Observe(outcome); }
 
   /// Name of the policy that the present episode goes by.

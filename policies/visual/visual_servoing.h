@@ -38,6 +38,7 @@ class VisualServoingPolicy : public Policy {
                        std::unique_ptr<FeatureTracker> tracker, const VisualServoingOptions& options = {});
 
   std::string_view name() const override { return name_; }
+  bool reads_hypotheses() const override { return false; }
   void Begin(const planner::Problem& problem) override;
   Decision Next(const Belief& belief) override;
   bool Observe(const Outcome& outcome) override;

@@ -384,8 +384,8 @@ nb::object Execute(PlanningTask& task, const nb::object& extents_given, const Ei
     throw;
   }
   raised->Rethrow();
-  record.localized = record.execution.localized;
-  record.inserted = record.execution.inserted;
+  record.localized = record.execution.believed_localized;
+  record.inserted = record.execution.believed_inserted;
   record.reason = record.execution.reason;
   return ToPython(evaluation::ToJson(record));
 }

@@ -110,9 +110,9 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
     const Episode episode = RunEpisode(problem, graph, 1, static_cast<std::uint64_t>(i));
     const ExecutionRecord& record = episode.record;
     EXPECT_FALSE(record.reason.empty());
-    EXPECT_EQ(record.inserted, episode.inserted) << "episode " << i << " " << Trace(record);
+    EXPECT_EQ(record.believed_inserted, episode.inserted) << "episode " << i << " " << Trace(record);
     const double worst = episode.error_m.head<2>().cwiseAbs().maxCoeff();
-    const bool good = record.localized && record.inserted && worst <= task.tolerance.lateral_m &&
+    const bool good = record.believed_localized && record.believed_inserted && worst <= task.tolerance.lateral_m &&
                       std::abs(episode.error_m.z()) <= task.tolerance.vertical_m;
     if (!good) {
       if (++failed <= 3) {
@@ -174,7 +174,7 @@ TEST(Executor, MovedWorldSameMotions) {
     const ExecutionRecord a = RunEpisode(problem, graph, 2, i, Pose::Identity(), faultless).record;
     const ExecutionRecord b = RunEpisode(problem, graph, 2, i, moved, faultless).record;
     EXPECT_EQ(Trace(a), Trace(b));
-    EXPECT_TRUE(a.inserted);
+    EXPECT_TRUE(a.believed_inserted);
   }
 }
 
@@ -240,7 +240,7 @@ TEST(Executor, AdversarialRobotsEndWithAReason) {
       const ExecutionRecord record = RunStubborn(robot);
       EXPECT_FALSE(record.reason.empty());
       if (!follow || contact) {
-        EXPECT_FALSE(record.inserted) << Trace(record);
+        EXPECT_FALSE(record.believed_inserted) << Trace(record);
       }
     }
   }
@@ -291,6 +291,34 @@ TEST(Executor, AdversarialPoliciesEndWithAReason) {
   EXPECT_NE(run(endless).find("limit"), std::string::npos);
   ThrowingPolicy throwing;
   EXPECT_EQ(run(throwing), "policy threw: no idea");
+}
+
+/// Counts what it is handed.
+class CountingPolicy final : public EndlessPolicy {
+ public:
+  explicit CountingPolicy(bool reads) : reads_(reads) {}
+  bool reads_hypotheses() const override { return reads_; }
+  policies::Decision Next(const policies::Belief& belief) override {
+    seen.push_back(belief.hypotheses.size());
+    return policies::GiveUp{"seen enough"};
+  }
+  std::vector<std::size_t> seen;
+
+ private:
+  bool reads_;
+};
+
+TEST(Executor, WhoDoesNotReadABeliefIsHandedNoHypotheses) {
+  const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3});
+  for (const bool reads : {false, true}) {
+    CountingPolicy policy(reads);
+    KinematicRobot robot(HousingOverPanel(), HousingTask(), Pose::Identity(),
+                         LatticeStartPose(HousingTask(), problem, Pose::Identity()), {}, RandomStream(1, 1, "robot"));
+    ExecutorOptions options;
+    options.ladder = false;
+    Execute(HousingTask(), problem, Pose::Identity(), policy, robot, options);
+    EXPECT_EQ(policy.seen, std::vector<std::size_t>{reads ? 27U : 0U});
+  }
 }
 
 TEST(Executor, OptionsOutOfRangeAreRefused) {

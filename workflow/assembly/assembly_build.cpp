@@ -311,7 +311,7 @@ class Builder {
     attempt.angle_rad = verdict.angle_rad;
     step.inserted = verdict.inserted;
     attempt.reason = verdict.inserted ? "inserted"
-                     : attempt.execution.inserted
+                     : attempt.execution.believed_inserted
                          ? "believed inserted, but " + std::string(env::ToString(verdict.reason))
                          : attempt.execution.reason;
     step.reason = attempt.reason;

@@ -7,7 +7,6 @@
 #include <set>
 #include <utility>
 
-#include "feeler/core/random.h"
 #include "feeler/env/model/collision_filter.h"
 
 namespace feeler::workflow {
@@ -91,20 +90,30 @@ class LooseTool {
   std::vector<Pose> body_T_geom_;
 };
 
+constexpr std::array<int, 4> kBases = {2, 3, 5, 7};
+
+/// The i-th number of the sequence of van der Corput in a base, in (0, 1); with several bases: of Halton. They fill a
+/// box more evenly than drawn ones, and are nobody's seed.
+double RadicalInverse(int i, int base) {
+  double inverse = 0.0;
+  for (double digit = 1.0 / base; i > 0; i /= base, digit /= base) inverse += digit * (i % base);
+  return inverse;
+}
+
 /// Tool frame in the target frame, for every place that is compared.
 std::vector<Pose> Places(const env::TaskModel& model) {
   const Task& task = model.task;
   const std::vector<Eigen::Quaterniond> turns = env::TargetOrientations(task);
   const Eigen::Vector3d half_m = LargestPositionExtents(task).cast<double>() * (0.5 * task.cell_m);
-  RandomStream random(0, 0, "places of a mating");
   std::vector<Pose> places;
-  for (int i = 0; i < kPlaces; ++i) {
+  for (int i = 1; i <= kPlaces; ++i) {
     Eigen::Vector3d place = task.start_offset_m + task.workspace_center_m;
     for (int axis = 0; axis < 3; ++axis) {
       const double reach_m = task.workspace_m[axis] + (half_m[axis] > 0.51 * task.cell_m ? half_m[axis] : 0.0);
-      place[axis] += random.Uniform(-reach_m, reach_m);
+      place[axis] += reach_m * (2.0 * RadicalInverse(i, kBases[axis]) - 1.0);
     }
-    const Eigen::Quaterniond turn = turns[random.Index(turns.size())];
+    const Eigen::Quaterniond turn =
+        turns[static_cast<std::size_t>(RadicalInverse(i, kBases[3]) * static_cast<double>(turns.size()))];
     places.emplace_back(Pose(turn.inverse()) * Eigen::Translation3d(place));
   }
   return places;

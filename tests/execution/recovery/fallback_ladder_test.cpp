@@ -92,7 +92,8 @@ TEST(FallbackLadder, TruthOutsideTheHypothesesIsFoundAndInserted) {
   int resolved = 0;
   for (const Pose& truth : TruthsOutside()) {
     const Result with = RunCase({truth, {}, true});
-    EXPECT_TRUE(with.record.inserted && with.inserted) << truth.translation().transpose() << "\n" << Log(with.record);
+    EXPECT_TRUE(with.record.believed_inserted && with.inserted) << truth.translation().transpose() << "\n"
+                                                                << Log(with.record);
     ASSERT_TRUE(with.record.world_T_estimate);
     const Eigen::Vector3d error = with.record.world_T_estimate->translation() - truth.translation();
     // A truth just outside may be inserted by what the chamfer forgives, without being looked for.
@@ -113,7 +114,7 @@ TEST(FallbackLadder, TurnedTargetIsMeasuredAndInserted) {
     const Pose truth = MakePose({0.0013, -0.0021, 0.0009}, degrees * kDegree);
     EXPECT_FALSE(RunCase({truth, {}, false}).inserted);
     const Result with = RunCase({truth, {}, true});
-    EXPECT_TRUE(with.record.inserted && with.inserted) << degrees << "\n" << Log(with.record);
+    EXPECT_TRUE(with.record.believed_inserted && with.inserted) << degrees << "\n" << Log(with.record);
     EXPECT_TRUE(Used(with.record, rung::kYawFit)) << Log(with.record);
     const Eigen::Matrix3d turn = with.record.world_T_estimate->linear();
     EXPECT_NEAR(std::atan2(turn(1, 0), turn(0, 0)), degrees * kDegree, 0.4 * kDegree);
@@ -126,7 +127,7 @@ TEST(FallbackLadder, OpeningTurnedAgainstItsHousingIsFoundBySweep) {
   for (const double degrees : {-3.0, 3.0, 5.0}) {
     c.faults.opening_yaw_rad = degrees * kDegree;
     const Result result = RunCase(c);
-    EXPECT_TRUE(result.record.inserted && result.inserted) << Log(result.record);
+    EXPECT_TRUE(result.record.believed_inserted && result.inserted) << Log(result.record);
     EXPECT_TRUE(Used(result.record, rung::kYawSweep)) << Log(result.record);
   }
 }
@@ -137,7 +138,7 @@ TEST(FallbackLadder, OpeningDisplacedInItsHousingIsFoundBySpiral) {
   for (const double offset_m : {-0.004, -0.0025, 0.0025, 0.004}) {
     c.faults.opening_offset_x_m = offset_m;
     const Result result = RunCase(c);
-    EXPECT_TRUE(result.record.inserted && result.inserted) << offset_m << " " << Log(result.record);
+    EXPECT_TRUE(result.record.believed_inserted && result.inserted) << offset_m << " " << Log(result.record);
     EXPECT_TRUE(Used(result.record, rung::kSpiral)) << Log(result.record);
     const Eigen::Vector3d opening = c.truth * Eigen::Vector3d(offset_m, 0.0, 0.0);
     const Eigen::Vector3d error = result.record.world_T_estimate->translation() - opening;
@@ -151,7 +152,7 @@ TEST(FallbackLadder, FalseReadingsDoNotEndInAWrongBelief) {
     c.truth = MakePose({0.0013, -0.0021, 0.0009});
     c.faults.phantom_contacts = phantoms;
     const Result result = RunCase(c, static_cast<std::uint64_t>(phantoms));
-    EXPECT_EQ(result.record.inserted, result.inserted) << phantoms << " " << Log(result.record);
+    EXPECT_EQ(result.record.believed_inserted, result.inserted) << phantoms << " " << Log(result.record);
     EXPECT_FALSE(result.record.reason.empty());
     if (phantoms <= 3) {
       EXPECT_TRUE(result.inserted) << phantoms << " " << Log(result.record);
@@ -173,7 +174,7 @@ TEST(FallbackLadder, PolicyThatGivesUpAtOnceIsReplacedByAPlanForTheWholeCuboid) 
   Case c;
   c.truth = MakePose({0.0013, -0.0021, 0.0009});
   const Result result = RunCase(c, 0, &policy);
-  EXPECT_TRUE(result.record.inserted && result.inserted) << Log(result.record);
+  EXPECT_TRUE(result.record.believed_inserted && result.inserted) << Log(result.record);
   ASSERT_EQ(result.record.ladder.size(), 1u) << Log(result.record);
   EXPECT_EQ(result.record.ladder.front().rung, rung::kWholeCuboid);
   EXPECT_EQ(result.record.ladder.front().reason, "policy gave up: no idea");
@@ -184,7 +185,7 @@ TEST(FallbackLadder, EndsWithTheReasonWhereThereIsNoOpening) {
   c.truth = MakePose({0.0013, -0.0021, 0.0009});
   c.faults.opening_offset_x_m = 0.030;
   const Result result = RunCase(c);
-  EXPECT_FALSE(result.record.inserted);
+  EXPECT_FALSE(result.record.believed_inserted);
   EXPECT_FALSE(result.inserted);
   ASSERT_FALSE(result.record.ladder.empty());
   EXPECT_TRUE(result.record.ladder.back().rung == rung::kGiveUp || result.record.reason.starts_with("limit:"))

@@ -86,6 +86,27 @@ TEST_F(ContactResponseTest, TheSpeedOfABudgetKeepsIt) {
   }
 }
 
+TEST_F(ContactResponseTest, AnEdgeThatIsBarelyMetKeepsTheBudget) {
+  // The face of the target is at zero height: the tool overlaps its rim by this much.
+  const std::vector<Wall> rims = {{{0.0, -0.0345, 0.0}, Eigen::Vector3d::UnitY()},
+                                  {{0.01, 0.0345, 0.0}, -Eigen::Vector3d::UnitY()}};
+  for (const double budget_n : {10.0, 25.0, 60.0}) {
+    double worst_face_on_n = 0.0;
+    for (Wall rim : rims) {
+      for (const double overlap_m : {0.03e-3, 0.06e-3, 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, 0.3e-3, 0.5e-3, 1e-3}) {
+        rim.start_m.z() = -overlap_m;
+        Place(rim.start_m);
+        const ContactResponse face = robot_.Contact(InWorld(rim.direction));
+        const ContactResponse beyond = robot_.Contact(InWorld(Eigen::Vector3d::UnitZ()));
+        const double speed_m_s = execution::SpeedOverEdge(face, beyond, budget_n);
+        EXPECT_LE(PeakForce(rim, speed_m_s), budget_n) << overlap_m << " at " << speed_m_s;
+        worst_face_on_n = std::max(worst_face_on_n, PeakForce(rim, execution::SpeedWithinBudget(face, budget_n)));
+      }
+    }
+    EXPECT_GT(worst_face_on_n, budget_n) << "the speed for a face would not do";
+  }
+}
+
 TEST_F(ContactResponseTest, ALateSensorIsCountedWith) {
   for (const double delay_s : {0.003, 0.008}) {
     delay_s_ = delay_s;
