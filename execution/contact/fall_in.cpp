@@ -35,6 +35,9 @@ std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Pro
   return mouths;
 }
 
+/// The walls of an opening hold a tool that is inside.
+constexpr MayMeet kInside{.long_wall = true, .edge_towards = std::nullopt};
+
 /// Middle between the walls on both sides along `axis`; empty if one is missing. The tool ends in the middle.
 std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& mover) {
   // What the clearance allows is at least the tolerance; a wall is told at the latest by the shortfall of a motion that
@@ -44,7 +47,7 @@ std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& move
   std::array<double, 2> walls{};
   for (const int sign : {1, -1}) {
     const MotionReport report =
-        mover.Probe(MakeDirection(axis, sign), begun[axis] + sign * range, "fall-in", PredictedCells{});
+        mover.Probe(MakeDirection(axis, sign), begun[axis] + sign * range, "fall-in", PredictedCells{}, kInside);
     walls[sign > 0 ? 0 : 1] = report.end[axis];
     mover.Retreat(begun);
     if (!report.contact) return std::nullopt;

@@ -11,8 +11,6 @@
 namespace feeler::execution {
 namespace {
 
-/// The insertion begins this far in front of the mouth, in cells.
-constexpr double kStandoff = 1.5;
 /// A clear displacement in front of the mouth is looked for up to here.
 constexpr int kFarthestClear = 8;
 /// A shorter way between the walls is not worth motions of its own, cells.
@@ -68,8 +66,10 @@ BelievedInsertion ApproachAndInsert(const Task& task, const planner::ContactMap&
   }
   // In front of the opening, exactly; then near it.
   const Eigen::Vector3d gate_displacement = gate->cast<double>() + map.phase();
-  const double gate_distance = std::max(kStandoff, gate_displacement.dot(out));
-  for (const double distance : {gate_distance, kStandoff}) {
+  // As near as a probe begins before what it may meet: the face beside the opening.
+  const double standoff = mover.options().fast_margin_cells;
+  const double gate_distance = std::max(standoff, gate_displacement.dot(out));
+  for (const double distance : {gate_distance, standoff}) {
     const Eigen::Vector3d place = target + distance * out;
     if ((mover.position() - place).norm() < 0.05) continue;
     const Eigen::Vector3d from = mover.position();

@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -176,6 +177,33 @@ TEST(WireCli, AMotionOutsideOfTheBoxIsNotSent) {
   EXPECT_EQ(executed.exit_code, 0) << executed.err;
   EXPECT_EQ(simulation.Wait().at("motions"), 0);
   EXPECT_NE(ReadFile(out).find("outside of the workspace box"), std::string::npos) << ReadFile(out);
+}
+
+TEST(WireCli, AMotionThatTheArmCannotMakeIsNotSent) {
+  // An arm whose elbow is all but fixed.
+  const std::string folder = ScratchFolder("wire_arm");
+  const std::string stiff = std::regex_replace(
+      ReadFile(std::string(FEELER_SOURCE_DIR) + "/models/robots/ur10e.urdf"),
+      std::regex("(elbow_joint\"[\\s\\S]*?<limit lower=\")[^\"]*(\" upper=\")[^\"]*"), "$010.00$020.01");
+  WriteFile(folder + "/stiff.urdf", stiff);
+  const std::string out = folder + "/records.jsonl";
+  for (const std::string wire : {"json", "numbers"}) {
+    // The numbers-only form knows no episodes: it is refused there, before anything moves.
+    Simulation simulation({"--seed", "3", "--no-replay"});
+    const CommandResult executed = RunFeeler(
+        Execute(simulation.address(), {"--arm", folder + "/stiff.urdf", "--wire", wire, "--out", out, "--json"}));
+    if (wire == "json") {
+      EXPECT_EQ(executed.exit_code, 0) << executed.err;
+      EXPECT_NE(ReadFile(out).find("elbow_joint would be at"), std::string::npos) << ReadFile(out);
+    } else {
+      EXPECT_NE(executed.exit_code, 0);
+    }
+    EXPECT_EQ(simulation.Stop().at("motions"), 0);
+  }
+  Simulation simulation({"--seed", "3", "--no-replay"});
+  const CommandResult refused = RunFeeler(Execute(simulation.address(), {"--arm", folder + "/none.urdf"}));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("none.urdf"), std::string::npos) << refused.err;
 }
 
 TEST(WireCli, BadInputIsOneLine) {
