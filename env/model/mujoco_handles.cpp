@@ -8,7 +8,7 @@
 #include <mutex>
 
 #include "feeler/core/error.h"
-#include "feeler/core/plain_locale.h"
+#include "feeler/core/text/plain_locale.h"
 #include "feeler/env/model/collision_filter.h"
 #include "feeler/env/model/contact_settings.h"
 

@@ -9,7 +9,7 @@
 #include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
 #include "feeler/core/orientation_lattice.h"
-#include "feeler/core/plain_locale.h"
+#include "feeler/core/text/plain_locale.h"
 #include "feeler/env/model/contact_settings.h"
 #include "feeler/env/model/geometry_findings.h"
 #include "feeler/env/model/mesh_check.h"

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "feeler/core/error.h"
-#include "feeler/core/plain_locale.h"
+#include "feeler/core/text/plain_locale.h"
 #include "feeler/env/arm/urdf_to_mjcf.h"
 #include "feeler/env/model/task_finding.h"
 #include "feeler/env/scene/contact_capacity.h"

@@ -49,8 +49,9 @@ std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& move
     const MotionReport report =
         mover.Probe(MakeDirection(axis, sign), begun[axis] + sign * range, "fall-in", PredictedCells{}, kInside);
     walls[sign > 0 ? 0 : 1] = report.end[axis];
+    if (report.contact) continue;  // from wall to wall: a fast way back might end at the other one
     mover.Retreat(begun);
-    if (!report.contact) return std::nullopt;
+    return std::nullopt;
   }
   Eigen::Vector3d middle = begun;
   middle[axis] = 0.5 * (walls[0] + walls[1]);

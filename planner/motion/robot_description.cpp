@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "feeler/core/error.h"
-#include "feeler/core/plain_locale.h"
+#include "feeler/core/text/plain_locale.h"
 
 namespace feeler::planner {
 namespace {

@@ -172,11 +172,15 @@ TEST_F(CadParts, WhatDoesNotFitOrFitsTwiceIsRefused) {
               testing::HasSubstr("two mouths fit as well: at -15.00,0.00,0.00 and at 15.00,0.00,0.00 mm"));
 }
 
-TEST_F(CadParts, AsciiAndBinaryStlAreOnePart) {
-  const TriangleMesh ascii = Read(WriteParts("keyed", folder_, "stl-ascii").tool).mesh;
-  const TriangleMesh binary = Read(WriteParts("keyed", folder_, "stl").tool).mesh;
-  EXPECT_EQ(ascii.size(), binary.size());
-  EXPECT_NEAR(VolumeOf(ascii), VolumeOf(binary), 1e-6 * VolumeOf(binary));
+TEST_F(CadParts, EveryMeshFormatIsOnePart) {
+  for (const std::string kind : {"keyed", "usb-a"}) {
+    const TriangleMesh expected = Read(WriteParts(kind, folder_, "stl").tool).mesh;
+    for (const std::string format : {"stl-ascii", "obj", "ply", "ply-ascii", "3mf"}) {
+      const TriangleMesh mesh = Read(WriteParts(kind, folder_, format).tool).mesh;
+      EXPECT_EQ(mesh.size(), expected.size()) << kind << ' ' << format;
+      EXPECT_NEAR(VolumeOf(mesh), VolumeOf(expected), 1e-6 * VolumeOf(expected)) << kind << ' ' << format;
+    }
+  }
 }
 
 TEST(CheckPart, MendsWhatIsSafeAndRefusesTheRest) {

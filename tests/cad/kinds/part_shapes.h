@@ -6,7 +6,7 @@
 
 namespace feeler::cad {
 
-/// A pair of parts as a CAD program would give them: drawn as solids, written as STEP or as STL when a test asks.
+/// A pair of parts as a CAD program would give them: drawn as solids, written as a file when a test asks.
 /// Millimetres; each part in a CAD frame of its own, unless `assembled`.
 struct PartKind {
   std::string name;
@@ -24,8 +24,8 @@ struct PartFiles {
   std::string tool;  ///< as `--tool` takes it
   std::string target;
 };
-/// Draws a kind and writes its parts into a folder. `format`: "step", "stl" (binary) or "stl-ascii"; "assembly" writes
-/// one STEP file with both solids.
+/// Draws a kind and writes its parts into a folder. `format`: "step", "stl" and "ply" (binary), "stl-ascii",
+/// "ply-ascii", "obj" or "3mf"; "assembly" writes one STEP file with both solids.
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format);
 
 }  // namespace feeler::cad

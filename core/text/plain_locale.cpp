@@ -1,4 +1,4 @@
-#include "feeler/core/plain_locale.h"
+#include "feeler/core/text/plain_locale.h"
 
 #include <locale>
 #include <mutex>
