@@ -19,7 +19,7 @@ double SpeedWithinBudget(const ContactResponse& contact, double budget_n) {
 double SpeedOverEdge(const ContactResponse& face, const ContactResponse& beyond, double budget_n) {
   const double period_s = std::sqrt(face.mass_kg() / face.stiffness_n_m);
   const double depth_per_speed_s =
-      (face.damping_ratio < 1.0 ? period_s : period_s / std::numbers::e) + face.reaction_time_s;
+      (face.damping_ratio < 1.0 ? period_s : period_s / std::numbers::e) + 2.0 * face.reaction_time_s;
   constexpr double kRobotHolds = 2.0;
   return kShareOfBudget * budget_n / (kRobotHolds * beyond.Held().stiffness_n_m * depth_per_speed_s);
 }

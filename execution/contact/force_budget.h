@@ -20,10 +20,11 @@ inline constexpr double kShareOfBudget = 0.85;
 
 /// The speed (m/s) at which the tool may meet an edge that it overlaps by little.
 ///
-/// Until a contact has taken the motion at speed v, the tool goes v (1/w + t) deep, w = sqrt(k / m) (1/(e w) where it
-/// is damped critically or more), t the reaction time. An edge that it overlaps by less it leaves over it: from one
-/// moment to the next the edge pushes along the other face, `beyond`, by all of that overlap. The robot, which holds
-/// its place, pushes as hard again (measured: 1.8 to 2 times the stiffness of the contact).
+/// Until a contact has taken the motion at speed v, the tool goes v (1/w + 2 t) deep, w = sqrt(k / m) (1/(e w) where it
+/// is damped critically or more), t the reaction time, and as long again until the force counts as a contact. An edge
+/// that it overlaps by less it leaves over it: from one moment to the next the edge pushes along the other face,
+/// `beyond`, by all of that overlap. The robot, which holds its place, pushes as hard again (measured: 1.8 to 2 times
+/// the stiffness of the contact).
 double SpeedOverEdge(const ContactResponse& face, const ContactResponse& beyond, double budget_n);
 
 }  // namespace feeler::execution
