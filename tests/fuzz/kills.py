@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """SIGKILL at random moments of commands that write; resumable.
 
-    tests/fuzz/kills.py --feeler build/feeler --kills 1000 --seed 1 --state state.json [--jobs-of preprocess,run]
+    tests/fuzz/kills.py --feeler build/feeler --kills 200 --seed 1 --state state.json [--commands preprocess,run]
 
 Laws, checked after every kill:
 - preprocess: the database verifies, and holds no problem less than before the kill;
@@ -27,6 +27,12 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 def call(feeler, arguments):
     return subprocess.run([feeler] + arguments, capture_output=True, stdin=subprocess.DEVNULL)
+
+
+def must(feeler, arguments):
+    done = call(feeler, arguments)
+    if done.returncode != 0:
+        sys.exit("%s: %s" % (" ".join(arguments), done.stderr.decode("utf-8", "replace")[-300:]))
 
 
 def read(path):
@@ -115,7 +121,7 @@ class Assemble(Command):
 
     def arguments(self, folder):
         databases = [part for database in self.shared["databases"] for part in ("--db", database)]
-        return ["assemble", "--assembly", "frame", "--out", self.out(folder)] + databases
+        return ["assemble", "--assembly", "crane", "--no-ladder", "--out", self.out(folder)] + databases
 
     def whole(self, data):
         return "the file has gone" if data is None else records_fault(data)
@@ -193,15 +199,14 @@ def last_fault(command, folder):
 def prepare_shared(feeler, folder, names):
     shared = {"results": os.path.join(folder, "results"), "databases": []}
     os.makedirs(shared["results"])
-    call(feeler, ["run", "--task", "plug", "--policy", "open-loop", "--episodes", "3", "--out",
+    must(feeler, ["run", "--task", "plug", "--policy", "open-loop", "--episodes", "3", "--out",
                   os.path.join(shared["results"], "e.jsonl")])
     if "assemble" in names:
-        assembly = json.load(open(os.path.join(ROOT, "models/assemblies/frame.json")))
-        tasks = sorted(set(json.dumps(assembly).split('"task": "')[i].split('"')[0]
-                           for i in range(1, json.dumps(assembly).count('"task": "') + 1)))
-        for task in tasks:
+        with open(os.path.join(ROOT, "models/assemblies/crane.json")) as file:
+            assembly = json.load(file)
+        for task in sorted(set(step["task"] for step in assembly["insertions"])):
             database = os.path.join(folder, task + ".db")
-            call(feeler, ["preprocess", "--task", task, "--out", database, "--time-limit", "20"])
+            must(feeler, ["preprocess", "--task", task, "--family", "2x2x2x2", "--out", database])
             shared["databases"].append(database)
     return shared
 
@@ -231,7 +236,7 @@ def main():
             place = os.path.join(folder, kind.name)
             os.makedirs(place)
             begin = time.time()
-            call(feeler, command.arguments(place))
+            must(feeler, command.arguments(place))
             longest = 1.1 * (time.time() - begin)
             if kind in (Preprocess, Calibrate):
                 shutil.rmtree(place)  # these go on where they were: begin anew each time they are through

@@ -27,6 +27,60 @@ TEXTS = ["", "0", "-1", "010", "1e308", "nan", "1x", "18446744073709551616", "9"
          "2x2x2", "2..99x2x2", "/dev/null", "/no/such", "/", ".", "é", "--", "--help", "\n"]
 
 
+TIGER = b"""discount: 0.95
+values: reward
+states: left right
+actions: listen open-left open-right
+observations: growl-left growl-right
+start: uniform
+T: listen
+identity
+T: open-left
+uniform
+T: open-right
+uniform
+O: listen
+0.85 0.15
+0.15 0.85
+O: open-left
+uniform
+O: open-right
+uniform
+R: listen : * : * : * -1
+R: open-left : left : * : * -100
+R: open-left : right : * : * 10
+R: open-right : left : * : * 10
+R: open-right : right : * : * -100
+"""
+CLOUD = b"""# .PCD v0.7
+VERSION 0.7
+FIELDS x y z
+SIZE 4 4 4
+TYPE F F F
+COUNT 1 1 1
+WIDTH 4
+HEIGHT 1
+VIEWPOINT 0 0 0 1 0 0 0
+POINTS 4
+DATA ascii
+0.6 0 0.2
+0.61 0 0.2
+0.6 0.01 0.2
+0.61 0.01 0.21
+"""
+PYRAMID = b"""o part
+v 0 0 0
+v 10 0 0
+v 0 10 0
+v 0 0 10
+f 1 3 2
+f 1 2 4
+f 2 3 4
+f 3 1 4
+"""
+CELL = b'{"format":"feeler cell","version":1,"tool":"plug","stiffness_n_m":60000,"box_min_m":[0,0,0],"box_max_m":[1,1,1]}'
+
+
 def mutate(data, rng):
     data = bytearray(data)
     for _ in range(rng.randint(1, 6)):
@@ -60,13 +114,25 @@ class Cases:
         os.makedirs(self.made, exist_ok=True)
         self.problem = os.path.join(ROOT, "tests/data/slot2d.json")
         made = lambda name: os.path.join(self.made, name)
-        self.sound = {"policy": made("p.json"), "db": made("x.db"), "records": made("e.jsonl")}
+        self.sound = {"policy": made("p.json"), "db": made("x.db"), "records": made("e.jsonl"), "other_db": made("y.db"),
+                      "shard": made("s1.jsonl"), "other_shard": made("s2.jsonl"), "table": made("t.json")}
+        run = ["run", "--task", "plug", "--db", self.sound["db"], "--episodes", "2"]
         calls = [["solve", "--problem", self.problem, "--out", self.sound["policy"]],
                  ["preprocess", "--task", "plug", "--family", "2..3x2x2", "--out", self.sound["db"]],
-                 ["run", "--task", "plug", "--db", self.sound["db"], "--episodes", "2", "--out", self.sound["records"]]]
+                 run + ["--out", self.sound["records"]],
+                 ["preprocess", "--task", "plug", "--family", "2x2x3", "--out", self.sound["other_db"]],
+                 run + ["--shard", "1/2", "--out", self.sound["shard"]],
+                 run + ["--shard", "2/2", "--out", self.sound["other_shard"]],
+                 ["perceive", "calibrate", "--task", "plug", "--poses", "30", "--installations", "2", "--frames", "1",
+                  "--out", self.sound["table"]]]
         for call, file in zip(calls, self.sound.values()):
             if not os.path.exists(file):
                 subprocess.run([feeler] + call, check=True, capture_output=True)
+        for name, text in {"pomdp": TIGER, "pomdp.pomdp": TIGER, "cloud": CLOUD, "mesh": PYRAMID,
+                           "mesh.obj": PYRAMID, "cell": CELL}.items():
+            self.sound[name] = made(name)
+            with open(self.sound[name], "wb") as file:
+                file.write(text)
 
     def mutated(self, source, name, rng):
         with open(source, "rb") as file:
@@ -80,7 +146,30 @@ class Cases:
     def command(self, rng):
         out = os.path.join(self.folder, "now", "out")
         data = os.path.join(ROOT, "tests/data", rng.choice(["slot2d", "lshape2d", "weighted2d", "pocket3d"]) + ".json")
-        case = rng.randrange(10)
+        case = rng.randrange(17)
+        sound = self.sound
+        if case == 10:
+            return ["solve", "--pomdp", self.mutated(sound["pomdp"], "m.pomdp", rng), "--time-limit", "1", "--out", out]
+        if case == 11:
+            return ["perceive", "--task", "plug", "--table", sound["table"], "--cloud",
+                    self.mutated(sound["cloud"], "c.pcd", rng)]
+        if case == 12:
+            return ["perceive", "--task", "plug", "--table", self.mutated(sound["table"], "t.json", rng), "--cloud",
+                    sound["cloud"]]
+        if case == 13:
+            return ["task", "import", "--tool", self.mutated(sound["mesh"], "a.obj", rng), "--target", sound["mesh"] +
+                    ".obj", "--uncertainty", "6mm,6mm,6mm", "--no-trial", "--out", out]
+        if case == 14:
+            return ["db", "merge", self.mutated(sound["db"], "x.db", rng), sound["other_db"], "--out", out]
+        if case == 15:
+            shutil.copyfile(sound["shard"] + ".shard.json", os.path.join(self.folder, "now", "s.jsonl.shard.json"))
+            part = rng.choice(["s.jsonl", "s.jsonl.shard.json"])
+            shutil.copyfile(sound["shard"], os.path.join(self.folder, "now", "s.jsonl"))
+            self.mutated(sound["shard"] + part[7:], part, rng)
+            return ["records", "merge", os.path.join(self.folder, "now", "s.jsonl"), sound["other_shard"], "--out", out]
+        if case == 16:
+            return ["execute", "--task", "plug", "--db", sound["db"], "--robot", "127.0.0.1:1", "--cell",
+                    self.mutated(sound["cell"], "cell.json", rng)]
         if case < 2:
             return ["solve", "--problem", self.mutated(data, "p.json", rng), "--time-limit", "1", "--out", out]
         if case == 2:
@@ -96,17 +185,26 @@ class Cases:
         if case == 6:
             task = os.path.join(ROOT, "models/tasks/plug.xml")
             return ["task", "show", self.mutated(task, "t.xml", rng)]
-        sound = rng.choice([["solve", "--problem", self.problem, "--out", out, "--seed", "1", "--epsilon", "2", "--gap",
+        line = rng.choice([["solve", "--problem", self.problem, "--out", out, "--seed", "1", "--epsilon", "2", "--gap",
                              "1.2", "--time-limit", "1", "--expansion-limit", "100", "--jobs", "1"],
                             ["export", "--problem", self.problem, "--format", "pomdp", "--out", out, "--discount", "1"],
                             ["db", "show", self.sound["db"], "--extents", "2x2x2"],
                             ["db", "export", self.sound["db"], "--extents", "2x2x2", "--out", out],
                             ["run", "--task", "plug", "--db", self.sound["db"], "--episodes", "1", "--seed", "1",
                              "--extents", "2x2x2", "--noise", "ideal", "--out", out],
-                            ["task", "show", "plug", "--opening", "closed"]])
-        at = rng.randrange(1, len(sound))
+                            ["task", "show", "plug", "--opening", "closed"],
+                            ["solve", "--pomdp", sound["pomdp"] + ".pomdp", "--precision", "0.1", "--levels", "3",
+                             "--time-limit", "1", "--seed", "1"],
+                            ["db", "merge", sound["db"], sound["other_db"], "--out", out],
+                            ["records", "merge", sound["shard"], sound["other_shard"], "--out", out],
+                            ["task", "render", "plug", "--view", "section", "--depth", "1", "--out", out],
+                            ["simulate", "--task", "plug", "--listen", "127.0.0.1:99999", "--seed", "1"],
+                            ["execute", "--task", "plug", "--db", sound["db"], "--robot", "127.0.0.1:1", "--episodes", "1"],
+                            ["experiment", "no-such", "--out", out, "--seed", "1"],
+                            ["report", self.made, "--out", out]])
+        at = rng.randrange(1, len(line))
         text = rng.choice(TEXTS)
-        return sound[:at] + [text] + sound[at + (rng.random() < 0.8):]
+        return line[:at] + [text] + line[at + (rng.random() < 0.8):]
 
 
 def fault_of(done, seconds, limit):
