@@ -59,6 +59,10 @@ ContactMap::Layer MakeLayer(const LatticeProblemData& data, const CellBox& domai
 
 Problem MakeLatticeProblem(const LatticeProblemData& data) {
   const std::string where = data.name.empty() ? "lattice problem" : "lattice problem " + data.name;
+  if (data.noise.any()) {
+    throw InputError(where, "has noise, which this use of it does not know",
+                     "feeler solve and feeler export do; else leave noise out");
+  }
   if ((data.size.array() <= 0).any())
     throw InputError(where, "size is not positive", "give three counts of at least 1");
   if (data.tool.empty()) throw InputError(where, "the tool has no cells", "give at least one");

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "feeler/planner/belief/noise.h"
 #include "feeler/planner/belief/problem.h"
 
 namespace feeler::planner {
@@ -21,10 +22,11 @@ struct LatticeProblemData {
   CostWeights cost;
   GoalKind goal = GoalKind::kSingleton;
   Cell insertable_spread = Cell::Zero();
+  Noise noise;  ///< not part of a Problem: see planner/noise
 };
 
 /// Builds the contact map from the voxel sets and the problem from the rest; validates. Throws InputError (non-positive
-/// size, no tool or target cells, start outside, blocked or duplicate hypotheses, bad weights, more than 2^26
+/// size, no tool or target cells, start outside, noise, blocked or duplicate hypotheses, bad weights, more than 2^26
 /// displacements).
 Problem MakeLatticeProblem(const LatticeProblemData& data);
 

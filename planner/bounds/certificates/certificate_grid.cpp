@@ -34,10 +34,13 @@ StepCosts MotionCosts(const CostWeights& cost, const std::vector<int>& lengths) 
 
 TableUnits::TableUnits(const StepCosts& costs) {
   const auto whole = [&](double x) { return std::fmod(x, costs.free) == 0.0; };
-  free_units =
-      whole(costs.contact) && whole(costs.start) && std::ranges::all_of(costs.beyond, whole) ? 1 : kUnitsPerStep;
+  const double look = costs.look < 0.0 ? costs.free : costs.look;
+  free_units = whole(costs.contact) && whole(costs.start) && whole(look) && std::ranges::all_of(costs.beyond, whole)
+                   ? 1
+                   : kUnitsPerStep;
   unit = costs.free / free_units;
   const auto units = [&](double x) { return static_cast<std::uint32_t>(std::min(60000.0, std::floor(x / unit))); };
+  look_units = units(look);
   contact_units = units(costs.contact);
   start_units = units(costs.start);
   std::ranges::transform(costs.beyond, beyond_units.begin(), units);
@@ -156,7 +159,7 @@ void TableCertificates(const ContactMap& map, int orientation, const Certificate
           }
           // A free step out of the domain shows what its projection, staying in place, would show.
           if (shows == 0) continue;
-          walks.probes.push_back({from, to, free ? grid.free_units : grid.contact_units, d, !free, shows});
+          walks.probes.push_back({from, to, free ? grid.look_units : grid.contact_units, d, !free, shows});
         }
       }
     }

@@ -27,6 +27,9 @@ struct StepCosts {
   /// What a step along each axis costs beyond `free`, where walks are made of guarded moves; elsewhere the least of the
   /// axes stands for all of them, which is a bound too.
   std::array<double, 3> beyond{};
+  /// Of a free step that returns something else than under another hypothesis (it may be less than `free` where
+  /// readings are noisy); negative: as any free step. Not for walks made of guarded moves.
+  double look = -1.0;
 };
 StepCosts LowerStepCosts(const CostWeights& cost, int longest_move);
 /// Costs of walks made of guarded moves as they are: bounds from these are tighter than from shares wherever per_action
@@ -39,6 +42,7 @@ struct TableUnits {
   explicit TableUnits(const StepCosts& costs);
   TableUnits() = default;
   std::uint32_t free_units = 1;  ///< of a free step
+  std::uint32_t look_units = 1;  ///< of a free step that tells something
   std::uint32_t contact_units = 0;
   std::uint32_t start_units = 0;
   std::array<std::uint32_t, 3> beyond_units{};  ///< of a free step along each axis, on top of free_units
