@@ -50,7 +50,8 @@ std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& move
         mover.Probe(MakeDirection(axis, sign), begun[axis] + sign * range, "fall-in", PredictedCells{}, kInside);
     walls[sign > 0 ? 0 : 1] = report.end[axis];
     if (report.contact) continue;  // from wall to wall: a fast way back might end at the other one
-    mover.Retreat(begun);
+    // No wall: it was not inside, and what it slid over on the way may be met on the way back.
+    mover.Probe(MakeDirection(axis, -sign), begun[axis], "fall-in", PredictedCells{}, kInside);
     return std::nullopt;
   }
   Eigen::Vector3d middle = begun;

@@ -140,6 +140,18 @@ TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {
   }
 }
 
+TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
+  for (const bool foreseen : {true, false}) {
+    Bench bench(0.1);
+    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    mover.Fast({4.0, 0.0, 0.0}, "transfer",
+               foreseen ? PredictedCells(std::array<double, 2>{1.0, 4.0}) : PredictedCells());
+    EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
+    mover.Fast({4.0, 3.0, 0.0}, "transfer");
+    EXPECT_EQ(bench.robot.speeds_m_s.back() < bench.options.transfer_speed_m_s, !foreseen);
+  }
+}
+
 TEST(Mover, RecoveryKeepsWithinTheBudgetFromItsStart) {
   Bench bench(1.0);
   bench.record.ladder.push_back({"refit", "off the policy tree"});
