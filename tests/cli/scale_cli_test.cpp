@@ -5,7 +5,7 @@
 //   - a shard that is there twice, missing, unfinished, overlapping or foreign is refused in one line, and nothing is
 //     left behind or overwritten;
 //   - 1, 2 and 8 ranks make the same content as none; a lost rank ends the job, and the same command goes on;
-//   - ranks that differ in task or command are refused, once.
+//   - ranks that differ in task or command, or of which one fails before it serves, are refused, once.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -235,6 +235,42 @@ TEST(SchedulerExamples, MakeTheWhole) {
   EXPECT_EQ(Digest(folder + "/parallel/plug.db"), Digest(parts.whole));
 }
 
+TEST(SchedulerExamples, OfKubernetesAndOfRanksMakeTheWhole) {
+  const std::string folder = ScratchFolder("kubernetes");
+  const std::string family = "2..3x2..3x2..3";
+  ASSERT_EQ(RunFeeler({"preprocess", "--task", "plug", "--family", family, "--out", folder + "/whole.db"}).exit_code,
+            0);
+  // What the kubelet runs in each pod, with this folder as its volume.
+  std::string text = ReadFile(FEELER_SOURCE_DIR "/examples/scale/kubernetes-job.yaml");
+  const std::size_t begin = text.find("args: [\"") + 8;
+  std::string args = text.substr(begin, text.find("\"]", begin) - begin);
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    ASSERT_NE(args.find(from), std::string::npos) << args;
+    args.replace(args.find(from), from.size(), to);
+  };
+  replace("feeler ", "\"$FEELER\" ");
+  replace("/out/", folder + "/");
+  replace("--task plug", "--task plug --family " + family);
+  EXPECT_NE(text.find("completions: 8"), std::string::npos);
+  std::vector<std::string> shards;
+  for (int index = 0; index < 8; ++index) {
+    const std::string number = std::to_string(index);
+    const CommandResult pod = Shell("export JOB_COMPLETION_INDEX=" + number + "; " + args);
+    ASSERT_EQ(pod.exit_code, 0) << pod.out;
+    shards.push_back(folder + "/shard-" + number + ".db");
+  }
+  ASSERT_EQ(Merge(shards, folder + "/merged.db").exit_code, 0);
+  EXPECT_EQ(Digest(folder + "/merged.db"), Digest(folder + "/whole.db"));
+
+  if (Shell("command -v mpirun").exit_code != 0) GTEST_SKIP() << "no mpirun";
+  const CommandResult ranks =
+      Shell("export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1; FAMILY=" + family + " OUT='" + folder +
+            "/mpi' bash " FEELER_SOURCE_DIR "/examples/scale/slurm-mpi.sbatch");
+  if (ranks.out.find("without MPI") != std::string::npos) GTEST_SKIP() << "feeler without MPI";
+  ASSERT_EQ(ranks.exit_code, 0) << ranks.out;
+  EXPECT_EQ(Digest(folder + "/mpi/plug.db"), Digest(folder + "/whole.db"));
+}
+
 /// With mpirun, where it and a feeler that knows it are there.
 class RanksTest : public ::testing::Test {
  protected:
@@ -305,6 +341,12 @@ TEST_F(RanksTest, ThatDifferAreRefusedOnce) {
   ASSERT_NE(first, std::string::npos) << both.out;
   EXPECT_EQ(both.out.find("feeler: error:", first + 1), std::string::npos) << both.out;
   EXPECT_EQ(Mpirun(2, "db info " + Family().whole).exit_code, 2);
+  // One that fails while the other is busy with the contact map.
+  const std::string run = "\"$FEELER\" run --task plug --episodes 2 --out " + folder + "/x.jsonl --db ";
+  const CommandResult fails = Shell("timeout 60 mpirun --allow-run-as-root --oversubscribe -n 1 " + run +
+                                    Family().whole + " : -n 1 " + run + folder + "/absent.db");
+  EXPECT_EQ(fails.exit_code, 2) << fails.out;
+  EXPECT_NE(fails.out.find("feeler: error: rank 1 on "), std::string::npos) << fails.out;
 }
 
 TEST(Estimate, IsNearTheTruthAndWritesNothing) {

@@ -33,7 +33,8 @@ class Ranks {
   virtual int rank() const = 0;
   virtual int size() const = 0;
 
-  /// Runs `load` on the first rank of each host, then on its others: what the first leaves in the cache they read.
+  /// Runs `load` on one rank of each host, then on its others: what the first leaves in the cache they read. A rank
+  /// that never comes here holds up nobody. Throws Interrupted after a cancellation.
   virtual void OncePerHost(const std::function<void()>& load) = 0;
 
   /// Rank 0: waits for the others and compares their identities with this one, a JSON object of what must be equal on
