@@ -129,6 +129,12 @@ void RequireSaneContactParameters(const mjModel& model, const std::string& where
       if (!(solimp[i] > 0 && solimp[i] <= 1))
         refuse(fmt::format("solimp {} is not in 0 to 1", solimp[i]), "\"0.95 0.99 0.0005\" is common");
     }
+    if (!(solimp[3] >= 0 && solimp[3] <= 1 && solimp[4] >= 1)) {
+      refuse(fmt::format("midpoint and power of solimp are {} and {}", solimp[3], solimp[4]), "0.5 2 is common");
+    }
+    if (!(model.geom_solmix[geom] >= 0)) {
+      refuse(fmt::format("solmix {} is negative", model.geom_solmix[geom]), "1 is common");
+    }
     if (!(solimp[2] >= 0)) refuse(fmt::format("the width {} of solimp is negative", solimp[2]), "0.0005 is common");
   }
 }

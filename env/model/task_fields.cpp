@@ -37,10 +37,10 @@ class Fields {
   }
 
   [[noreturn]] void Fail(const std::string& element, const std::string& field, const std::string& what,
-                         const std::string& mend = "") const {
+                         const std::string& mend) const {
     throw InputError(fmt::format("{}: <custom><{} name=\"{}\">", where_, element, field), what, mend);
   }
-  [[noreturn]] void FailNumber(const std::string& field, const std::string& what, const std::string& mend = "") const {
+  [[noreturn]] void FailNumber(const std::string& field, const std::string& what, const std::string& mend) const {
     Fail("numeric", field, what, mend);
   }
 
@@ -57,7 +57,7 @@ class Fields {
     const double* data = model_.numeric_data + model_.numeric_adr[id];
     std::vector<double> values(data, data + size);
     for (const double value : values) {
-      if (!std::isfinite(value)) FailNumber(field, "is not a finite number");
+      if (!std::isfinite(value)) FailNumber(field, "is not a finite number", "give finite numbers");
     }
     return values;
   }
@@ -69,13 +69,17 @@ class Fields {
   }
 
   void CheckRange(const char* field, double value, double low, double high) const {
-    if (value < low || value > high) FailNumber(field, fmt::format("{} is not in {} to {}", value, low, high));
+    if (value < low || value > high) {
+      FailNumber(field, fmt::format("{} is not in {} to {}", value, low, high),
+                 fmt::format("give a number from {} to {}", low, high));
+    }
   }
 
   std::vector<int> WholeNumbers(const char* field, int count, const std::string& meaning, int low, int high) const {
     std::vector<int> whole;
     for (const double value : Numbers(field, count, meaning)) {
-      if (value != std::floor(value)) FailNumber(field, fmt::format("{} is not a whole number", value));
+      if (value != std::floor(value))
+        FailNumber(field, fmt::format("{} is not a whole number", value), "give whole numbers");
       CheckRange(field, value, low, high);
       whole.push_back(static_cast<int>(value));
     }
@@ -140,7 +144,8 @@ void ReadAxes(const Fields& fields, Task& task) {
     axis.min_cells = min_cells[k];
     axis.max_cells = max_cells[k];
     if (axis.resolution <= 0) {
-      fields.FailNumber("feeler_resolution", fmt::format("{} is not positive", axis.resolution));
+      fields.FailNumber("feeler_resolution", fmt::format("{} is not positive", axis.resolution),
+                        "give the spacing of the lattice, in m or rad");
     }
     if (axis.resolution > (axis.angular() ? 1.0 : 0.1)) {
       fields.FailNumber("feeler_resolution",
@@ -148,13 +153,17 @@ void ReadAxes(const Fields& fields, Task& task) {
                         "positions in m, angles in rad");
     }
     if (axis.resolution < 1e-5) {
-      fields.FailNumber("feeler_resolution", fmt::format("{} of axis {} is finer than the 1e-5 that collision "
-                                                         "detection resolves",
-                                                         axis.resolution, ToString(axis.kind)));
+      fields.FailNumber("feeler_resolution",
+                        fmt::format("{} of axis {} is finer than the 1e-5 that collision "
+                                    "detection resolves",
+                                    axis.resolution, ToString(axis.kind)),
+                        "give 1e-5 or more");
     }
     if (axis.min_cells > axis.max_cells) {
-      fields.FailNumber("feeler_min_cells", fmt::format("{} of axis {} exceeds feeler_max_cells {}", axis.min_cells,
-                                                        ToString(axis.kind), axis.max_cells));
+      fields.FailNumber(
+          "feeler_min_cells",
+          fmt::format("{} of axis {} exceeds feeler_max_cells {}", axis.min_cells, ToString(axis.kind), axis.max_cells),
+          "give at most as many as feeler_max_cells");
     }
     if (axis.angular()) continue;
     if (cell_m != 0 && axis.resolution != cell_m) {
@@ -167,7 +176,8 @@ void ReadAxes(const Fields& fields, Task& task) {
   if (fields.HasNumeric("feeler_cell") || cell_m == 0) {
     const double cell = fields.Number("feeler_cell", "the lattice spacing of positions in m", 1e-5, 0.1);
     if (cell_m != 0 && cell != cell_m) {
-      fields.FailNumber("feeler_cell", fmt::format("{} contradicts feeler_resolution {}", cell, cell_m));
+      fields.FailNumber("feeler_cell", fmt::format("{} contradicts feeler_resolution {}", cell, cell_m),
+                        "leave it out: x, y and z share the lattice of feeler_resolution");
     }
     cell_m = cell;
   }
@@ -193,13 +203,14 @@ void ReadMotion(const Fields& fields, Task& task) {
   for (const UncertainAxis& axis : task.axes) {
     if (!axis.angular() && task.workspace_m[static_cast<int>(axis.kind)] < task.cell_m) {
       fields.FailNumber("feeler_workspace",
-                        fmt::format("leaves the tool no room along the uncertain axis {}", ToString(axis.kind)));
+                        fmt::format("leaves the tool no room along the uncertain axis {}", ToString(axis.kind)),
+                        "give at least one cell along each uncertain axis");
     }
   }
   task.move_lengths =
       fields.WholeNumbers("feeler_move_lengths", -1, "the lengths of guarded moves in cells", 1, kMaxMoveCells);
   if (std::set<int>(task.move_lengths.begin(), task.move_lengths.end()).size() != task.move_lengths.size()) {
-    fields.FailNumber("feeler_move_lengths", "names a length twice");
+    fields.FailNumber("feeler_move_lengths", "names a length twice", "name each once");
   }
   std::sort(task.move_lengths.begin(), task.move_lengths.end());
   if (task.move_lengths.front() != 1) {
@@ -216,14 +227,17 @@ void ReadMotion(const Fields& fields, Task& task) {
   task.insertion = *direction;
   task.insertion_depth_m =
       fields.Number("feeler_insertion_depth", "the travel from the mouth to inserted, m", 0, kMaxLength_m);
-  if (task.insertion_depth_m == 0) fields.FailNumber("feeler_insertion_depth", "is zero");
+  if (task.insertion_depth_m == 0) {
+    fields.FailNumber("feeler_insertion_depth", "is zero", "give the travel from the mouth to inserted, m");
+  }
 
   const Eigen::Vector3d position = fields.Vector("feeler_flange_position", "the tool frame's origin in the flange, m");
   for (const double value : position) fields.CheckRange("feeler_flange_position", value, -kMaxLength_m, kMaxLength_m);
   const auto q = fields.Numbers("feeler_flange_quaternion", 4, "the tool frame's orientation in the flange, w x y z");
   const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
   if (std::abs(orientation.norm() - 1) > 1e-3) {
-    fields.FailNumber("feeler_flange_quaternion", fmt::format("has length {} instead of 1", orientation.norm()));
+    fields.FailNumber("feeler_flange_quaternion", fmt::format("has length {} instead of 1", orientation.norm()),
+                      "divide its four numbers by that length; 0 1 0 0 points the tool down");
   }
   task.flange_T_tool = MakePose(position, orientation);
 }
@@ -238,8 +252,10 @@ void ReadVerdict(const Fields& fields, Task& task) {
   task.tolerance.vertical_m = positive("feeler_tolerance_vertical", "the largest error along the insertion, m", 0.1);
   task.tolerance.angle_rad = positive("feeler_tolerance_angle", "the largest error of the orientation, rad", 1);
   if (task.tolerance.vertical_m >= task.insertion_depth_m) {
-    fields.FailNumber("feeler_tolerance_vertical", fmt::format("{} is not below feeler_insertion_depth {}",
-                                                               task.tolerance.vertical_m, task.insertion_depth_m));
+    fields.FailNumber(
+        "feeler_tolerance_vertical",
+        fmt::format("{} is not below feeler_insertion_depth {}", task.tolerance.vertical_m, task.insertion_depth_m),
+        "give less than the depth: with as much, doing nothing would be inserted");
   }
 
   const auto cost =

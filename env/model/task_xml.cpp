@@ -5,10 +5,10 @@
 #include <array>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 #include <system_error>
+#include <vector>
 
 #include "feeler/core/error.h"
 #include "feeler/env/mjcf/mjcf_numbers.h"
@@ -67,6 +67,7 @@ class Includer {
     tinyxml2::XMLDocument part;
     const std::string part_name = file.lexically_normal().string();
     Parse(ReadTextFile(file), part_name, part);
+    RequireFiniteNumbers(*part.RootElement(), part_name);  // here, where its lines are its own
     Resolve(*part.RootElement(), part_name);
     tinyxml2::XMLNode* last = &include;
     for (tinyxml2::XMLNode* node = part.RootElement()->FirstChild(); node != nullptr; node = node->NextSibling()) {
@@ -83,8 +84,22 @@ class Includer {
 constexpr std::array<const char*, 7> kFileAttributes{"file",     "fileright", "fileleft", "fileup",
                                                      "filedown", "filefront", "fileback"};
 
+constexpr std::size_t kLargestFile = std::size_t{1} << 30;
+
+/// MuJoCo reads a file to its end, and a device or a pipe may have none. What is not there it names itself.
+void RequireRegularFile(const fs::path& file, const tinyxml2::XMLElement& asset, const std::string& name) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (error || !fs::exists(status)) return;
+  const std::string where = name + ": <" + asset.Name() + "> in line " + std::to_string(asset.GetLineNum());
+  if (!fs::is_regular_file(status)) throw InputError(where, file.string() + " is not a regular file", "give a file");
+  if (fs::file_size(file, error) <= kLargestFile || error) return;
+  throw InputError(where, file.string() + " is larger than " + std::to_string(kLargestFile) + " bytes",
+                   "give a smaller file");
+}
+
 /// MuJoCo looks for meshes and height fields in meshdir, for textures in texturedir, both relative to the main file.
-void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const fs::path& folder) {
+void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const std::string& name, const fs::path& folder) {
   fs::path mesh_folder = folder;
   fs::path texture_folder = folder;
   for (auto* compiler = root.FirstChildElement("compiler"); compiler != nullptr;
@@ -101,7 +116,9 @@ void MakeAssetFilesAbsolute(tinyxml2::XMLElement& root, const fs::path& folder) 
       for (const char* key : kFileAttributes) {
         const char* file = asset->Attribute(key);
         if (file == nullptr) continue;
-        asset->SetAttribute(key, ((texture ? texture_folder : mesh_folder) / file).lexically_normal().c_str());
+        const fs::path absolute = ((texture ? texture_folder : mesh_folder) / file).lexically_normal();
+        RequireRegularFile(absolute, *asset, name);
+        asset->SetAttribute(key, absolute.c_str());
       }
     }
   }
@@ -114,7 +131,15 @@ std::string ReadTextFile(const fs::path& file) {
   std::error_code error;
   if (!in || fs::is_directory(file, error))
     throw InputError(file.string(), "cannot be read", "check the name and the permissions");
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  std::string text;  // read to the end, at most to the limit: a device has no size of its own
+  std::vector<char> chunk(1 << 16);
+  while (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || in.gcount() > 0) {
+    text.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
+    if (text.size() > kLargestFile) {
+      throw InputError(file.string(), "is larger than " + std::to_string(kLargestFile) + " bytes",
+                       "give a smaller file");
+    }
+  }
   if (in.bad()) throw InputError(file.string(), "cannot be read", "check the name and the permissions");
   return text;
 }
@@ -134,9 +159,9 @@ std::set<std::string> Resolve(const std::string& mjcf, const std::string& name, 
   const fs::path absolute = fs::absolute(folder, error).lexically_normal();
   if (error) throw InputError(name, "its folder is not to be found: " + error.message(), "change to another folder");
   Includer includer(absolute, document);
-  includer.Resolve(root, name);
   RequireFiniteNumbers(root, name);
-  MakeAssetFilesAbsolute(root, absolute);
+  includer.Resolve(root, name);
+  MakeAssetFilesAbsolute(root, name, absolute);
   return includer.included();
 }
 

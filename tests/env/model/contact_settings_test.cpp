@@ -32,6 +32,7 @@ std::string RefusalOf(const Change& change) {
   try {
     LoadTaskFromText(text.Mjcf(), "peg.xml");
   } catch (const InputError& error) {
+    EXPECT_TRUE(std::string(error.what()).ends_with(')')) << "says not how to mend it: " << error.what();
     return error.what();
   }
   return "";
@@ -88,10 +89,29 @@ TEST(Numbers, AreFiniteAndMeanSomethingByName) {
   ExpectParts(RefusalOf(Insert("name=\"east\"", " friction=\"-0.3 0.005 0.0001\"")),
               {"<geom name=\"east\">", "friction -0.3"});
   ExpectParts(RefusalOf(Insert("name=\"east\"", " solref=\"0.01 -1\"")), {"<geom name=\"east\">", "solref"});
+  ExpectParts(RefusalOf(Insert("name=\"east\"", " solimp=\"0.9 0.95 0.001 7 2\"")), {"<geom name=\"east\">", "7"});
+  ExpectParts(RefusalOf(Insert("name=\"east\"", " solmix=\"-1\"")), {"<geom name=\"east\">", "solmix -1"});
+  ExpectParts(RefusalOf([](TaskText& t) { t.target_body = R"(<body name="target" pos="0.6 0 1e300">)"; }),
+              {"<body name=\"target\">", "pos", "1e300", "1000 m"});
   // A body may be called anything.
   TaskText text;
   text.target += R"(<body name="nan"><geom name="infinity" size="0.001" contype="0" conaffinity="0"/></body>)";
   EXPECT_NO_THROW(LoadTaskFromText(text.Mjcf(), "peg.xml"));
+}
+
+TEST(Numbers, OfAnIncludedFileAreNamedWithThatFileAndItsLine) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "included_numbers";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "part.xml") << "<mujoco>\n\n<geom name=\"stop\" size=\"0.01\" mass=\"nan\"/>\n</mujoco>\n";
+  TaskText text;
+  text.target += R"(<include file="part.xml"/>)";
+  try {
+    LoadTaskFromText(text.Mjcf(), "peg.xml", folder);
+    ADD_FAILURE() << "no error";
+  } catch (const InputError& error) {
+    ExpectParts(error.what(), {"part.xml: <geom name=\"stop\"> in line 3", "mass", "nan"});
+  }
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Meshes, FlatIsOneLineWithItsName) {
@@ -102,6 +122,18 @@ TEST(Meshes, FlatIsOneLineWithItsName) {
   });
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   ExpectParts(message, {"<mesh name=\"sheet\">", "plane"});
+}
+
+TEST(Meshes, ADeviceOrAPipeIsNotRead) {
+  const std::filesystem::path link = std::filesystem::path(testing::TempDir()) / "endless.stl";
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink("/dev/zero", link);
+  for (const char* asset : {R"(<mesh name="m" file=")", R"(<texture name="m" type="2d" file=")"}) {
+    const std::string message =
+        RefusalOf([&](TaskText& t) { t.extra = std::string("<asset>") + asset + link.string() + "\"/></asset>"; });
+    ExpectParts(message, {"in line ", "endless.stl is not a regular file"});
+  }
+  std::filesystem::remove(link);
 }
 
 TEST(Meshes, AnObjOfSeveralObjectsIsRefused) {

@@ -34,6 +34,7 @@ std::string ErrorOf(const std::function<void()>& action) {
   try {
     action();
   } catch (const InputError& error) {
+    EXPECT_TRUE(std::string(error.what()).ends_with(')')) << "says not how to mend it: " << error.what();
     return error.what();
   }
   return "no error";
