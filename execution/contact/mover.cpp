@@ -104,7 +104,8 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
   const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
   const MotionReport report = Finish(result, target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
-  // Where nothing was to be, or harder than it may be: the next transfer may meet it again, with more way to gain speed.
+  // Where nothing was to be, or harder than it may be: the next transfer may meet it again, with more way to gain
+  // speed.
   const bool unexpected = !predicted || record_.moves.back().peak_force_n > options_.force_budget_n;
   record_.careful = record_.careful || (report.contact && unexpected);
   return report;

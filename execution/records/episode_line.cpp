@@ -111,8 +111,9 @@ ordered_json ToJson(const EpisodeLine& line, const ExecutionRecord& execution) {
   json["localized"] = OrNull(line.localized);
   json["inserted"] = OrNull(line.inserted);
   json["reason"] = line.reason;
-  json["believed"] = {
-      {"localized", execution.believed_localized}, {"inserted", execution.believed_inserted}, {"reason", execution.reason}};
+  json["believed"] = {{"localized", execution.believed_localized},
+                      {"inserted", execution.believed_inserted},
+                      {"reason", execution.reason}};
   json["moves"] = ordered_json::array();
   for (const MoveRecord& move : execution.moves) json["moves"].push_back(MoveJson(move));
   json["policy_moves"] = execution.policy_moves;
