@@ -6,10 +6,12 @@
 #include "feeler/cli/common/console.h"
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
+#include "feeler/cli/noise/noisy_solve.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/noise/noisy_pomdp.h"
 #include "feeler/planner/pomdp/files/pomdp_file.h"
 #include "feeler/planner/pomdp/model/rock_sample.h"
 #include "feeler/policies/io/lattice_problem_file.h"
@@ -26,6 +28,7 @@ struct Flags {
   std::string out;
   double upper_bound = 0.0;  ///< 0: not given
   double discount = 1.0;
+  NoiseFlags noise;
 };
 
 void Write(const Flags& flags, const std::string& text) {
@@ -48,7 +51,23 @@ std::string RockSampleText(const Flags& flags) {
   return planner::FormatCassandraPomdp(planner::MakeRockSample(planner::DrawRockSample(size, rocks, flags.seed)));
 }
 
-void Run(const Flags& flags) {
+std::string NoisyText(const CLI::App& command, const Flags& flags, const planner::NoisyProblem& noisy) {
+  if (flags.format != "pomdp") throw InputError("--format", "noise is written as pomdp", "leave it out");
+  if (command.count("--upper-bound") > 0) {
+    throw InputError("--upper-bound", "does not go with noise", "--wrong-cost says what a wrong declaration costs");
+  }
+  planner::Pomdp pomdp = planner::MakeNoisyPomdp(noisy);
+  pomdp.discount = flags.discount;
+  constexpr std::size_t kMostBytes = 400'000'000;
+  constexpr std::size_t kBytesPerLine = 40;
+  const std::size_t rows = pomdp.action_count() * pomdp.state_count();
+  if ((pomdp.transitions.entries.size() + 2 * rows) * kBytesPerLine > kMostBytes) {
+    throw InputError(flags.problem, "takes more than 400 MB", "export a smaller problem");
+  }
+  return planner::FormatCassandraPomdp(pomdp);
+}
+
+void Run(const CLI::App& command, const Flags& flags) {
   if (flags.format != "pomdp" && flags.format != "pomdpx") {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
   }
@@ -58,7 +77,12 @@ void Run(const Flags& flags) {
     throw InputError("export", "give either --problem or --rock-sample", "see feeler export --help");
   }
   if (!flags.rock_sample.empty()) return Write(flags, RockSampleText(flags));
-  const planner::Problem problem = planner::MakeLatticeProblem(policies::ReadLatticeProblem(flags.problem));
+  planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
+  const planner::Noise noise = flags.noise.Over(command, data.noise);
+  flags.noise.RequireNoise(command, noise);
+  data.noise = {};
+  const planner::Problem problem = planner::MakeLatticeProblem(data);
+  if (noise.any()) return Write(flags, NoisyText(command, flags, {problem, noise, flags.noise.declaration}));
   policies::PomdpOptions options;
   options.discount = flags.discount;
   if (flags.upper_bound > 0.0) options.upper_bound = flags.upper_bound;
@@ -86,7 +110,8 @@ void AddExportCommand(CLI::App& app, Session& /*session*/) {
   AddReal(*command, "--discount", flags->discount, 0.5, 1.0,
           "of the written model: 1 is the problem itself, solvers that need less than 1 find another value "
           "(docs/file-formats.md)");
-  command->callback([flags] { Run(*flags); });
+  flags->noise.AddTo(*command);
+  command->callback([command, flags] { Run(*command, *flags); });
 }
 
 }  // namespace feeler::cli

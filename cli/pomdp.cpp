@@ -39,8 +39,8 @@ PomdpSolverKind KindOf(const CLI::App& command, const SolverFlags& solver, const
 
 planner::PomdpSolverOptions Options(const CLI::App& command, const PomdpFlags& flags, const SolverFlags& solver,
                                     const planner::Pomdp& pomdp) {
-  for (const char* option :
-       {"--gap", "--heuristic", "--setting", "--task", "--problem", "--extents", "--goal", "--cost"}) {
+  for (const char* option : {"--gap", "--heuristic", "--setting", "--task", "--problem", "--extents", "--goal",
+                             "--cost", "--missed-contact", "--false-stop", "--slip", "--confidence", "--wrong-cost"}) {
     if (command.count(option) > 0) throw InputError(option, "does not go with --pomdp", "see feeler solve --help");
   }
   planner::PomdpSolverOptions options;

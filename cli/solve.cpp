@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <functional>
 #include <memory>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/noise/noisy_solve.h"
 #include "feeler/cli/policy_output.h"
 #include "feeler/cli/pomdp.h"
 #include "feeler/cli/solver_flags.h"
@@ -38,10 +40,12 @@ struct Flags {
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
   SolverFlags solver;
+  NoiseFlags noise;
   PomdpFlags pomdp;
 };
 
-planner::Problem LoadProblem(const Flags& flags, const Session& session) {
+/// `noise`: of the problem's file, if it has any.
+planner::Problem LoadProblem(const Flags& flags, const Session& session, planner::Noise& noise) {
   if (flags.task.empty() == flags.problem.empty()) {
     throw InputError("solve", "give either --task with --extents, or --problem, or --pomdp", "see feeler solve --help");
   }
@@ -54,6 +58,8 @@ planner::Problem LoadProblem(const Flags& flags, const Session& session) {
     }
     planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
     if (!flags.goal.empty()) data.goal = ParseGoal(flags.goal);
+    noise = data.noise;
+    data.noise = {};
     return planner::MakeLatticeProblem(data);
   }
   if (flags.extents.empty()) throw InputError("--extents", "missing", "give the extents, e.g. --extents 7x7x5");
@@ -107,6 +113,26 @@ std::int64_t NoteAlike(const planner::Problem& problem, const planner::ContactMa
   return count;
 }
 
+/// Prints the bounds as they close, to standard error.
+std::function<void(const planner::BoundsRow&)> BoundsTable() {
+  return [header = false](const planner::BoundsRow& row) mutable {
+    if (!std::isfinite(row.lower_bound)) return;  // unlocalizable: said below
+    if (!header) {
+      Note("{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper", "ratio");
+      header = true;
+    }
+    Note("{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
+         row.lower_bound, row.upper_bound, row.Ratio());
+  };
+}
+
+/// With noise there is one heuristic.
+void RequireNoHeuristic(const CLI::App& command) {
+  for (const char* option : {"--heuristic", "--setting"}) {
+    if (command.count(option) > 0) throw InputError(option, "does not go with noise", "leave it out");
+  }
+}
+
 void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (!flags.pomdp.pomdp.empty()) {
     return RunSolvePomdp(command, flags.pomdp, flags.solver, flags.out, flags.json, session);
@@ -117,18 +143,17 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   std::vector<std::string> inputs = flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task);
   inputs.push_back(flags.problem);
   RequireOutputs({{"--out", flags.out, FileKind::kPolicy}}, inputs);
-  const planner::Problem problem = LoadProblem(flags, session);
-
-  bool header = false;
-  options.on_bounds = [&header](const planner::BoundsRow& row) {
-    if (!std::isfinite(row.lower_bound)) return;  // unlocalizable: said below
-    if (!header) {
-      Note("{:>9} {:>9} {:>12} {:>12} {:>12} {:>8}\n", "time s", "trials", "expansions", "lower", "upper", "ratio");
-      header = true;
-    }
-    Note("{:>9.3f} {:>9} {:>12} {:>12.4f} {:>12.4f} {:>8.4f}\n", row.wall_s, row.trials, row.expansions,
-         row.lower_bound, row.upper_bound, row.Ratio());
-  };
+  planner::Noise noise;
+  const planner::Problem problem = LoadProblem(flags, session, noise);
+  noise = flags.noise.Over(command, noise);
+  flags.noise.RequireNoise(command, noise);
+  options.on_bounds = BoundsTable();
+  const std::string unit = workflow::CostUnit(ParseCost(flags.cost), problem.cost);
+  if (noise.any()) {
+    RequireNoHeuristic(command);
+    const std::string name = flags.task.empty() ? problem.name : flags.task;
+    return RunSolveNoisy({problem, noise, flags.noise.declaration}, options, {name, unit, flags.out, flags.json});
+  }
   planner::Validate(options);
   ProgressBar table_bar("tables");
   options.on_tables = Interruptible(table_bar, session);
@@ -143,7 +168,6 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                                  : 0;
   if (result.complete() && !flags.out.empty())
     WritePolicy(problem, *result.policy, flags.task.empty() ? problem.name : flags.task, flags.out);
-  const std::string unit = workflow::CostUnit(ParseCost(flags.cost), problem.cost);
   if (flags.json) {
     nlohmann::json pairs = nlohmann::json::array();
     for (const auto& [i, j] : result.indistinguishable) pairs.push_back({i, j});
@@ -188,6 +212,7 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   AddJobs(*command, flags->jobs, "threads, for contact map and tables");
   command->add_flag("--json", flags->json, "print the result as JSON");
   flags->solver.AddTo(*command);
+  flags->noise.AddTo(*command);
   flags->pomdp.AddTo(*command);
   command->callback([command, flags, &session] { Run(*command, *flags, session); });
 }

@@ -16,6 +16,7 @@
 #include "feeler/evaluation/studies/baselines.h"
 #include "feeler/evaluation/studies/bounds.h"
 #include "feeler/evaluation/studies/noise.h"
+#include "feeler/evaluation/studies/noise_price.h"
 #include "feeler/evaluation/studies/perception.h"
 #include "feeler/evaluation/studies/pomdp_benchmarks.h"
 #include "feeler/evaluation/studies/spiral_tuning.h"
@@ -40,6 +41,8 @@ std::vector<Experiment> AllExperiments() {
       {kFigureTblName, "planning time and relative cost of touch-based localization against the number of hypotheses",
        RunFigureTbl, true},
       {kNoiseName, "sensor noise, joint friction and stiffness, a turned target: what breaks first", RunNoise},
+      {kNoisePriceName, "what noise in the readings costs: policies that know of it, and those that do not",
+       RunNoisePrice},
       {kPerceptionName, "registration and uncertainty table over the workspace: errors, coverage, hypotheses",
        RunPerception},
       {kPomdpBenchmarksName, "general POMDPs: proven intervals over time beside SARSOP's, and RTDP-Bel",

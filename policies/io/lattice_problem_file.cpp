@@ -93,6 +93,16 @@ CostWeights ReadCost(const JsonField& object) {
   return cost;
 }
 
+planner::Noise ReadNoise(const JsonField& object, const std::string& where) {
+  object.RequireKeys({}, {"missed_contact", "false_stop", "slip"});
+  planner::Noise noise;
+  if (object.Has("missed_contact")) noise.missed_contact = object["missed_contact"].Number(0.0);
+  if (object.Has("false_stop")) noise.false_stop = object["false_stop"].Number(0.0);
+  if (object.Has("slip")) noise.slip = object["slip"].Number(0.0);
+  planner::Validate(noise, where + ", noise");
+  return noise;
+}
+
 void CheckStart(const LatticeProblemData& data, const JsonField& document) {
   const JsonField start = document["start"];
   for (int axis = 0; axis < 3; ++axis) {
@@ -150,7 +160,7 @@ LatticeProblemData ParseLatticeProblem(std::string_view text, const std::string&
   const json parsed = ParseJson(text, where);
   const JsonField document(parsed, where);
   document.RequireKeys({"name", "size", "start", "tool", "target", "hypotheses"},
-                       {"move_lengths", "cost", "goal", "insertable_spread"});
+                       {"move_lengths", "cost", "goal", "insertable_spread", "noise"});
   LatticeProblemData data;
   data.name = document["name"].Text();
   data.size = document["size"].AsCell(1, kMaxSize);
@@ -175,6 +185,7 @@ LatticeProblemData ParseLatticeProblem(std::string_view text, const std::string&
     if (data.goal != GoalKind::kInsertable) spread.Fail("has no meaning without goal \"insertable\"", "remove it");
     data.insertable_spread = spread.AsCell(0, kMaxCoordinate);
   }
+  if (document.Has("noise")) data.noise = ReadNoise(document["noise"], where);
   CheckDisplacements(data, document);
   CheckStart(data, document);
   return data;
@@ -204,6 +215,12 @@ std::string FormatLatticeProblem(const LatticeProblemData& data) {
   if (data.goal == GoalKind::kInsertable) {
     add("goal", "\"insertable\"");
     add("insertable_spread", CellJson(data.insertable_spread).dump());
+  }
+  if (data.noise.any()) {
+    add("noise", json{{"missed_contact", data.noise.missed_contact},
+                      {"false_stop", data.noise.false_stop},
+                      {"slip", data.noise.slip}}
+                     .dump());
   }
   return text + "\n}\n";
 }

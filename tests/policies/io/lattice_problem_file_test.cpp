@@ -48,6 +48,7 @@ void ExpectSame(const LatticeProblemData& a, const LatticeProblemData& b) {
   EXPECT_EQ(a.cost, b.cost);
   EXPECT_EQ(a.goal, b.goal);
   EXPECT_EQ(a.insertable_spread, b.insertable_spread);
+  EXPECT_EQ(a.noise, b.noise);
   ASSERT_EQ(a.hypotheses.size(), b.hypotheses.size());
   for (std::size_t i = 0; i < a.hypotheses.size(); ++i) {
     EXPECT_EQ(a.hypotheses[i].offset, b.hypotheses[i].offset);
@@ -78,6 +79,7 @@ TEST(LatticeProblemFile, RoundTrips) {
     data.cost = {random.Uniform(), random.Uniform(), random.Uniform()};
     data.name = "quote \" and \n and \xC3\xA9";
     if (episode % 2 == 1) data.goal = GoalKind::kInsertable, data.insertable_spread = Cell(1, 0, 2);
+    if (episode % 3 == 1) data.noise = {random.Uniform(0.0, 0.5), random.Uniform(0.0, 0.5), random.Uniform(0.0, 0.5)};
     const std::string text = FormatLatticeProblem(data);
     ExpectSame(ParseLatticeProblem(text, "file.json"), data);
     EXPECT_EQ(FormatLatticeProblem(ParseLatticeProblem(text, "file.json")), text);
@@ -100,6 +102,22 @@ TEST(LatticeProblemFile, BadInputNamesTheField) {
   };
   const std::vector<Case> cases = {
       {[](json& j) { j["size"][0] = -5; }, "file.json, size[0]: ", "is -5"},
+      {[](json& j) {
+         j["noise"] = {{"false_stop", 1.0}};
+       },
+       "file.json, noise: ", "false_stop is 1"},
+      {[](json& j) {
+         j["noise"] = {{"slip", -0.1}};
+       },
+       "file.json, noise.slip: ", "-0.1"},
+      {[](json& j) {
+         j["noise"] = {{"drift", 0.1}};
+       },
+       "file.json, noise", "drift"},
+      {[](json& j) {
+         j["noise"] = {{"missed_contact", 0.7}, {"false_stop", 0.4}};
+       },
+       "file.json, noise: ", "information"},
       {[](json& j) { j["size"][2] = 0; }, "file.json, size[2]: ", "is 0"},
       {[](json& j) {
          j["size"] = {1000, 1000, 1000};
