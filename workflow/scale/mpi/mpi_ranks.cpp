@@ -162,9 +162,6 @@ class MpiRanks final : public Ranks {
     }
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
-    job_ = static_cast<std::uint64_t>(steady_clock::now().time_since_epoch().count()) ^
-           static_cast<std::uint64_t>(getpid()) << 40;
-    MPI_Bcast(&job_, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     accounts_.resize(static_cast<std::size_t>(size_));
     greetings_.resize(static_cast<std::size_t>(size_));
     for (int i = 0; i < size_; ++i) accounts_[static_cast<std::size_t>(i)].rank = i;
@@ -173,17 +170,11 @@ class MpiRanks final : public Ranks {
 
   ~MpiRanks() override {
     if (rank_ == 0) Dismiss();
-    unlink(TurnFile().c_str());
     MPI_Finalize();
   }
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-
-  void OncePerHost(const std::function<void()>& load) override {
-    const HostTurn turn(TurnFile(), cancellation_);
-    load();
-  }
 
   void Assemble(const std::string& identity) override {
     Nap nap;
@@ -287,13 +278,6 @@ class MpiRanks final : public Ranks {
   }
 
  private:
-  /// One name on all ranks of the job.
-  std::string TurnFile() const {
-    std::error_code error;
-    const auto folder = std::filesystem::temp_directory_path(error);
-    return (error ? std::filesystem::path("/tmp") : folder) / fmt::format("feeler-ranks-{:016x}", job_);
-  }
-
   bool SendAll() {
     std::deque<Message> out;
     {
@@ -411,8 +395,7 @@ class MpiRanks final : public Ranks {
   CancellationToken& cancellation_;
   int rank_ = 0;
   int size_ = 1;
-  std::uint64_t job_ = 0;  ///< a number of the job
-  MpiPost post_;           // the main thread's, and while it runs the pump's
+  MpiPost post_;  // the main thread's, and while it runs the pump's
   std::vector<Greeting> greetings_;
   std::vector<int> workers_;  ///< lane modulo their number -> rank
 
