@@ -39,7 +39,7 @@ command="preprocess --task $TASK --family $FAMILY"
 "$OUT/enter" 10.77.0.1 mpirun --allow-run-as-root --host 10.77.0.1:1,10.77.0.2:1 -n 2 \
   --mca plm_rsh_agent "$OUT/enter" --mca btl tcp,self --mca btl_tcp_if_include 10.77.0.0/24 \
   --mca oob_tcp_if_include 10.77.0.0/24 --mca pml ob1 \
-  -x FEELER_CACHE_DIR= -x HOME="$OUT" "$FEELER" $command --json --out "$OUT/hosts.db" > "$OUT/hosts.json" 2> "$OUT/log"
+  "$FEELER" $command --json --out "$OUT/hosts.db" > "$OUT/hosts.json" 2> "$OUT/log"
 code=$?
 [ "$code" -eq 0 ] || { cat "$OUT/log"; exit 1; }
 python3 -c 'import json, sys; print([(r["rank"], r["host"], r["done"]) for r in json.load(open(sys.argv[1]))["ranks"]])' \

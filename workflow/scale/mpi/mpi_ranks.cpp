@@ -2,27 +2,20 @@
 
 #define OMPI_SKIP_MPICXX 1
 #define MPICH_SKIP_MPICXX 1
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
-#include <sys/file.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <deque>
 #include <exception>
-#include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -72,39 +65,6 @@ class Nap {
 
  private:
   microseconds length_ = kShortNap;
-};
-
-/// The first rank of a host to come has its turn alone, those after it together, once it is through or dead: nobody
-/// waits for a rank that failed on its way here. Where no such file can be had, all are the first.
-class HostTurn {
- public:
-  HostTurn(std::string file, const CancellationToken& cancellation) : file_(std::move(file)) {
-    descriptor_ = open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    Nap nap;
-    while (descriptor_ >= 0 && flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      if (errno != EWOULDBLOCK && errno != EINTR) break;
-      if (cancellation.cancelled()) {
-        close(descriptor_);
-        throw Interrupted();
-      }
-      std::this_thread::sleep_for(nap.Next());
-    }
-    struct stat status {};
-    first_ = descriptor_ >= 0 && fstat(descriptor_, &status) == 0 && status.st_size == 0;
-    if (descriptor_ >= 0 && !first_) flock(descriptor_, LOCK_UN);
-  }
-  ~HostTurn() {
-    if (descriptor_ < 0) return;
-    if (first_ && write(descriptor_, "1", 1) != 1) unlink(file_.c_str());
-    close(descriptor_);
-  }
-  HostTurn(const HostTurn&) = delete;
-  HostTurn& operator=(const HostTurn&) = delete;
-
- private:
-  std::string file_;
-  int descriptor_ = -1;
-  bool first_ = false;
 };
 
 /// What the greeting of a rank holds.
