@@ -93,7 +93,7 @@ nlohmann::json RateJson(const evaluation::Rate& rate) {
 }
 
 void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
-                  const std::vector<workflow::AssemblyRecord>& records) {
+                  const std::vector<workflow::AssemblyRecord>& records, const Session& session) {
   const workflow::AssemblySummary summary = workflow::Summarize(records);
   const evaluation::Rate complete = evaluation::WilsonRate(summary.complete, summary.builds);
   const evaluation::Rate inserted = evaluation::WilsonRate(summary.inserted, summary.insertions);
@@ -114,6 +114,7 @@ void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
     for (const workflow::AssemblyRecord& record : records) {
       if (!record.complete) json["stops"].push_back({{"seed", record.seed}, {"reason", record.reason}});
     }
+    if (session.ranks != nullptr) json["ranks"] = RanksJson(session, std::ssize(records));
     PrintJson(json);
     return;
   }
@@ -161,10 +162,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     return;
   }
   ProgressBar map_bar("contact map");
-  std::optional<workflow::AssemblyTasks> loaded;
-  session.OncePerHost(
-      [&] { loaded = workflow::LoadAssemblyTasks(assembly, flags.databases, jobs, Interruptible(map_bar, session)); });
-  const workflow::AssemblyTasks& tasks = *loaded;
+  const workflow::AssemblyTasks tasks = workflow::LoadAssemblyTasks(
+      assembly, flags.databases, TableJobsOf(jobs, session), Interruptible(map_bar, session));
   map_bar.Finish();
 
   workflow::AssemblyOptions options;
@@ -217,7 +216,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
     workflow::WriteAssemblyVideo(assembly, film, records.front(), flags.video, Interruptible(video_bar, session));
   }
   NoteRanks(session, static_cast<std::int64_t>(records.size()));
-  PrintSummary(flags, assembly, records);
+  PrintSummary(flags, assembly, records, session);
   const bool one_stopped = flags.builds == 1 && !records.empty() && !records.front().complete;
   if (one_stopped || session.cancellation->cancelled()) session.exit_code = 1;
 }

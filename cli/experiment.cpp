@@ -14,6 +14,7 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
+#include "feeler/evaluation/harness/experiment_on_ranks.h"
 #include "feeler/evaluation/registry.h"
 
 namespace feeler::cli {
@@ -39,7 +40,7 @@ void List() {
   }
 }
 
-void Run(const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (flags.list) return List();
   if (flags.name.empty()) {
     throw InputError("experiment", "no name given", "choose one of " + evaluation::ExperimentNames());
@@ -51,7 +52,7 @@ void Run(const Flags& flags, Session& session) {
     throw InputError("--out", flags.out + " is a file", "give a folder");
   }
 
-  if (std::filesystem::is_directory(flags.out, error)) {
+  if (!session.serves() && std::filesystem::is_directory(flags.out, error)) {
     RequireOutputs({{"--out", flags.out + "/" + flags.name + ".json", FileKind::kExperiment},
                     {"--out", flags.out + "/manifest.json", FileKind::kManifest}},
                    flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task));
@@ -59,11 +60,12 @@ void Run(const Flags& flags, Session& session) {
 
   ProgressBar map_bar("contact map");
   ProgressBar database_bar("policies");
-  ProgressBar bar(flags.name);
+  ProgressBar bar(session.ranks != nullptr ? WithRanks(flags.name, session) + ", part of rank 0" : flags.name);
   evaluation::ExperimentRequest request;
   request.out = flags.out;
   request.quick = flags.quick;
-  request.jobs = Parallelism(flags.jobs);
+  request.jobs = JobsOf(command, flags.jobs, session);
+  request.store = TablesOfHost(session);
   request.seed = flags.seed;
   request.task = flags.task;
   request.pomdps = flags.pomdps;
@@ -79,10 +81,14 @@ void Run(const Flags& flags, Session& session) {
   request.map_progress = Interruptible(map_bar, session);
   request.database_progress = database_bar.Callback();
   request.progress = bar.Callback();
-  const evaluation::ExperimentOutcome outcome = evaluation::RunExperiment(experiment, request);
+  const evaluation::ExperimentOutcome outcome =
+      session.ranks != nullptr ? evaluation::RunExperimentOnRanks(experiment, request, *session.ranks)
+                               : evaluation::RunExperiment(experiment, request);
+  if (session.serves()) return;
   map_bar.Finish();
   database_bar.Finish();
   bar.Finish();
+  NoteRanks(session, session.ranks != nullptr ? session.ranks->size() : 0);
   if (request.shard && !session.cancellation->cancelled()) {
     Note("shard {} of {} is measured: give all their folders to feeler experiment {} --from\n", request.shard->index,
          request.shard->count, flags.name);
@@ -121,7 +127,7 @@ void AddExperimentCommand(CLI::App& app, Session& session) {
   command->add_option("--from", flags->from, "folders of shards, to go on from what they measured");
   AddSeed(*command, flags->seed, "of the sample and the first of the solver seeds");
   AddJobs(*command, flags->jobs, "threads; more than the cores would spoil the measured times");
-  command->callback([flags, &session] { Run(*flags, session); });
+  command->callback([command, flags, &session] { Run(*command, *flags, session); });
 }
 
 }  // namespace feeler::cli

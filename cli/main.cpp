@@ -40,7 +40,7 @@ std::unique_ptr<feeler::workflow::Ranks> ConnectRanks(int argc, char** argv) {
   if (words.empty() || has("--help") || has("--version")) return nullptr;
   const std::string_view command = words.front();
   if (command != "preprocess" && command != "run" && command != "assemble" &&
-      !(command == "perceive" && has("calibrate"))) {
+      !(command == "experiment" && !has("--list")) && !(command == "perceive" && has("calibrate"))) {
     throw feeler::InputError("ranks", fmt::format("{} ranks were started, feeler {} runs on one", count, command),
                              "start it without mpirun");
   }

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -142,7 +143,7 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
   options.progress = bar.Callback();
   const workflow::Calibration calibration = workflow::Calibrate(model, options);
   bar.Finish();
-  NoteRanks(session, static_cast<std::int64_t>(calibration.samples.size()));
+  NoteRanks(session, std::ssize(calibration.samples));
   if (options.shard && !session.cancellation->cancelled()) {
     Note("shard {} of {}: {} poses in {}; give all shards to feeler perceive calibrate --from\n", options.shard->index,
          options.shard->count, calibration.samples.size(), flags.out);
@@ -157,7 +158,9 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
   const std::string report = workflow::ReportJson(calibration, options);
   WriteFileAtomically(flags.out, perception::ToJson(calibration.table, report));
   if (flags.json) {
-    PrintJson(nlohmann::json::parse(report));
+    nlohmann::json json = nlohmann::json::parse(report);
+    if (session.ranks != nullptr) json["ranks"] = RanksJson(session, std::ssize(calibration.samples));
+    PrintJson(json);
     return;
   }
   std::string text = fmt::format(

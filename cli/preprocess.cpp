@@ -39,6 +39,7 @@ struct Flags {
   bool estimate = false;
   int ranks = 1;
   int sample = 64;
+  std::string times;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   bool json = false;
   SolverFlags solver;
@@ -74,6 +75,11 @@ planner::PreprocessOptions OptionsOf(const workflow::PlanningSetup& setup, plann
   return options;
 }
 
+/// Contact map and tables are there once.
+std::int64_t MemoryOnOneHost(const workflow::FamilyEstimate& estimate, int ranks) {
+  return estimate.shared_bytes + (estimate.rank_bytes - estimate.shared_bytes) * ranks;
+}
+
 void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily& family,
               planner::PreprocessOptions options, const Flags& flags) {
   if (options.solver.solver == planner::SolverKind::kERtdpBel && options.experience != planner::ExperienceKind::kNone) {
@@ -82,7 +88,14 @@ void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily
   }
   ProgressBar bar("sample");
   options.progress = bar.Callback();
-  const workflow::FamilyEstimate estimate = workflow::EstimateFamily(setup, family, options, flags.sample);
+  workflow::FamilyEstimate estimate;
+  if (flags.times.empty()) {
+    estimate = workflow::EstimateFamily(setup, family, options, flags.sample);
+  } else {
+    policies::Database measured = policies::Database::OpenReadOnly(flags.times);
+    measured.RequireFingerprint(setup.task().name, setup.fingerprint);
+    estimate = workflow::EstimateFromTimes(setup, family, options, measured);
+  }
   bar.Finish();
   const workflow::JobModel model = workflow::ModelOf(estimate);
   const workflow::JobForecast alone = workflow::Simulate(model, 1);
@@ -95,7 +108,8 @@ void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily
                {"cpu_error", estimate.cpu_error},
                {"tables_s", estimate.tables_s},
                {"memory_per_rank_bytes", estimate.rank_bytes},
-               {"memory_bytes", estimate.rank_bytes * flags.ranks},
+               {"memory_shared_per_host_bytes", estimate.shared_bytes},
+               {"memory_bytes", MemoryOnOneHost(estimate, flags.ranks)},
                {"commit_s", estimate.commit_s},
                {"ranks", flags.ranks},
                {"wall_s", many.wall_s},
@@ -105,13 +119,20 @@ void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily
                {"committing_s", many.committing_s}});
     return;
   }
-  Print("problems            {}, {} of them solved for this estimate in {:.1f} s CPU\n", estimate.problems,
-        estimate.sampled, estimate.sample_cpu_s);
-  Print("CPU time            {:.0f} s, +- {:.0f} % (one half of the sample about the other)\n", estimate.cpu_s,
-        100 * estimate.cpu_error);
-  Print("tables              {:.1f} s CPU, once a rank\n", estimate.tables_s);
-  Print("memory              {:.0f} MB a rank, {:.1f} GB for {}\n", static_cast<double>(estimate.rank_bytes) / 1e6,
-        static_cast<double>(estimate.rank_bytes) * flags.ranks / 1e9, flags.ranks);
+  if (flags.times.empty()) {
+    Print("problems            {}, {} of them solved for this estimate in {:.1f} s CPU\n", estimate.problems,
+          estimate.sampled, estimate.sample_cpu_s);
+    Print("CPU time            {:.0f} s, +- {:.0f} % (one half of the sample about the other)\n", estimate.cpu_s,
+          100 * estimate.cpu_error);
+  } else {
+    Print("problems            {}, with their times in {}\n", estimate.problems, flags.times);
+    Print("CPU time            {:.0f} s\n", estimate.cpu_s);
+  }
+  Print("tables              {:.1f} s CPU, once a host\n", estimate.tables_s);
+  Print("memory              {:.0f} MB a host and {:.0f} MB a rank, {:.1f} GB for {} on one host\n",
+        static_cast<double>(estimate.shared_bytes) / 1e6,
+        static_cast<double>(estimate.rank_bytes - estimate.shared_bytes) / 1e6,
+        static_cast<double>(MemoryOnOneHost(estimate, flags.ranks)) / 1e9, flags.ranks);
   Print("wall time           {:.0f} s on 1 rank, {:.0f} s on {} (efficiency {:.2f})\n", alone.wall_s, many.wall_s,
         flags.ranks, many.efficiency);
   Print("limits              longest problem {:.2f} s; rank 0 commits for {:.1f} s\n", many.longest_s,
@@ -143,6 +164,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   options.solver = flags.solver.Options(command);
   options.seed = options.solver.seed;
   options.jobs = JobsOf(command, flags.jobs, session);
+  options.store = TablesOfHost(session);
+  options.table_jobs = TableJobsOf(options.jobs, session);
   options.cancellation = session.cancellation;
   if (flags.order == "random") {
     options.order = planner::ProblemOrder::kRandom;
@@ -160,10 +183,10 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   workflow::PlanningSetupOptions setup_options;
   setup_options.opening = ParseOpening(flags.opening);
   setup_options.cost_kind = ParseCost(flags.cost);
-  setup_options.jobs = options.jobs;
+  setup_options.jobs = TableJobsOf(options.jobs, session);
+  setup_options.on_cache_failure = TellCacheFailure;
   setup_options.progress = Interruptible(map_bar, session);
-  workflow::PlanningSetup setup;
-  session.OncePerHost([&] { setup = workflow::LoadPlanningSetup(flags.task, setup_options); });
+  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
   map_bar.Finish();
   const planner::ProblemFamily family = FamilyFor(flags.family, setup);
   workflow::RequireWithinTask(family, setup.task());
@@ -229,6 +252,8 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
                     "say what CPU, memory and wall time it will take, from a sample; writes nothing");
   AddInteger(*command, "--ranks", flags->ranks, 1, 1'000'000, "that the estimate is for");
   AddInteger(*command, "--sample", flags->sample, 2, 1'000'000, "problems that the estimate solves");
+  command->add_option("--times", flags->times,
+                      "a database of the family, for the estimate: the times it was made with instead of a sample");
   AddShard(*command, flags->shard, "the family, into a file of its own for feeler db merge");
   command->add_flag("--json", flags->json, "print the summary as JSON");
   flags->solver.AddTo(*command);

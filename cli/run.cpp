@@ -190,7 +190,8 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   if (!flags.db.empty()) {
     database = std::make_shared<policies::Database>(policies::Database::OpenReadOnly(flags.db));
   }
-  const workflow::PolicyOptions policy_options = workflow::ParsePolicyOptions(flags.policy_options);
+  workflow::PolicyOptions policy_options = workflow::ParsePolicyOptions(flags.policy_options);
+  policy_options.store = TablesOfHost(session);
   const workflow::PolicyFactory policy_factory = workflow::MakePolicyFactory(flags.policy, database, policy_options);
   const workflow::PolicyFactory versus_factory =
       flags.versus.empty() ? policy_factory : workflow::MakePolicyFactory(flags.versus, database, policy_options);
@@ -198,13 +199,12 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   ProgressBar map_bar("contact map");
   workflow::PlanningSetupOptions setup_options;
   if (database) setup_options = workflow::SetupOptionsOf(database->identity());
-  setup_options.jobs = jobs;
+  setup_options.jobs = TableJobsOf(jobs, session);
+  setup_options.on_cache_failure = TellCacheFailure;
   setup_options.progress = Interruptible(map_bar, session);
   CheckQuickly(flags.task, setup_options.opening);
-  std::shared_ptr<const workflow::PlanningSetup> setup;
-  session.OncePerHost([&] {
-    setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
-  });
+  const auto setup =
+      std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
   map_bar.Finish();
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
 

@@ -1,18 +1,16 @@
 #include "feeler/cli/session.h"
 
 #include <algorithm>
+#include <mutex>
+#include <thread>
 #include <vector>
 
 #include "feeler/cli/common/console.h"
+#include "feeler/env/contact/contact_map_cache.h"
 
 namespace feeler::cli {
 
 bool Session::serves() const { return ranks != nullptr && ranks->rank() > 0; }
-
-void Session::OncePerHost(const std::function<void()>& load) const {
-  if (ranks == nullptr) return load();
-  ranks->OncePerHost(load);
-}
 
 CLI::Option* AddShard(CLI::App& command, std::string& text, const std::string& of) {
   return command.add_option(
@@ -28,6 +26,23 @@ std::optional<workflow::Shard> ShardOf(const std::string& text) {
 
 Parallelism JobsOf(const CLI::App& command, int jobs, const Session& session) {
   return Parallelism(session.ranks != nullptr && command.count("--jobs") == 0 ? 1 : jobs);
+}
+
+Parallelism TableJobsOf(Parallelism jobs, const Session& session) {
+  if (session.ranks == nullptr) return jobs;
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  return Parallelism(std::max(jobs.threads(), std::min(cores, jobs.threads() * workflow::LaunchedOnHost())));
+}
+
+void TellCacheFailure(const std::string& reason) {
+  static std::once_flag once;
+  std::call_once(once,
+                 [&] { Note("feeler: the cache does without: {}; FEELER_CACHE_DIR names another folder\n", reason); });
+}
+
+std::shared_ptr<const planner::ArrayStore> TablesOfHost(const Session& session) {
+  if (session.ranks == nullptr) return nullptr;
+  return std::make_shared<const planner::ArrayStore>(env::CacheFolder(), "", TellCacheFailure);
 }
 
 nlohmann::json RanksJson(const Session& session, std::int64_t total) {

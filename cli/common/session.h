@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -21,8 +20,6 @@ struct Session {
 
   /// True on ranks that work for rank 0, which alone holds the files. (cli/session.cpp)
   bool serves() const;
-  /// Does it once a host before all others there, where there are ranks. (cli/session.cpp)
-  void OncePerHost(const std::function<void()>& load) const;
 };
 
 /// Prints a result for machines: one JSON document on stdout.

@@ -306,6 +306,7 @@ ExperimentResult RunDatabaseTable(const PlanningCase& planning_case, DatabaseTab
   result.settings["seeds"] = result.seeds;
   SweepContext context{&cells, request.jobs, request.cancellation, request.progress};
   context.shard = request.shard;
+  context.store = request.store;
   SolverSweep sweep(planning_case, sample, rows, result.seeds, context);
   context.keep_policies = false;
   SolverSweep family_sweep(planning_case, whole, family_rows, {request.seed}, context);

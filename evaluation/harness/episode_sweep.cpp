@@ -239,6 +239,7 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
   build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   build.solver.gap = kGap;
   build.jobs = request_.jobs;
+  build.store = request_.store;
   build.cancellation = request_.cancellation;
   build.progress = request_.database_progress;
   const std::string database_file = request_.out + "/databases/" + world.setup->task().name + "-" + cost + ".db";

@@ -154,7 +154,7 @@ std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const plan
   if (!tables) {
     const planner::Problem problem =
         planner::MakeCuboidProblem(case_.task, case_.map, planner::LargestExtents(sample_));
-    tables = planner::BuildPlanningTables(problem, options, context_.jobs);
+    tables = planner::BuildPlanningTables(problem, options, context_.jobs, context_.store.get());
   }
   return tables;
 }

@@ -48,7 +48,8 @@ struct SweepContext {
   /// Keep policies that may serve as experience with the cells. Without, a row of E-RTDP-Bel that was interrupted is
   /// run again from its first problem: right for whole families, whose policies would fill gigabytes.
   bool keep_policies = true;
-  std::optional<workflow::Shard> shard = std::nullopt;  ///< run only these problems of each row
+  std::shared_ptr<const planner::ArrayStore> store = nullptr;  ///< as in ExperimentRequest
+  std::optional<workflow::Shard> shard = std::nullopt;         ///< run only these problems of each row
 };
 
 /// Runs rows over a sample, seed by seed, by Algorithm 3 (planner::Preprocess): E-RTDP-Bel takes the most similar

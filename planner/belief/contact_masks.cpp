@@ -1,6 +1,8 @@
 #include "feeler/planner/belief/contact_masks.h"
 
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 namespace feeler::planner {
 namespace {
@@ -32,19 +34,30 @@ bool StepMatters(const ContactMap& map, const Cell& displacement, Direction d, i
 
 }  // namespace
 
-ContactMasks::ContactMasks(const ContactMap& map) {
+ContactMasks::ContactMasks(const ContactMap& map, const ArrayStore* store) {
   // One cell beyond the map's domain everything repeats, save steps back into it; a window reaches 15 cells down from
   // its corner.
   domain_ = {map.domain().min - Cell::Ones(), map.domain().max + Cell(kMaskWindow, kMaskWindow, 1)};
   size_ = domain_.Size();
   stride_ = static_cast<std::size_t>(domain_.Count());
-  index_.assign(stride_ * kDirectionCount * static_cast<std::size_t>(map.orientations()), 0);
-  masks_.emplace_back();
+  if (store != nullptr && store->Take<std::uint32_t>("mask indices", {&index_}) &&
+      store->Take<Bits256>("masks", {&masks_})) {
+    return;
+  }
+  Fill(map);
+  if (store == nullptr) return;
+  store->Keep<std::uint32_t>("mask indices", {&index_});
+  store->Keep<Bits256>("masks", {&masks_});
+}
+
+void ContactMasks::Fill(const ContactMap& map) {
+  std::vector<std::uint32_t> index(stride_ * kDirectionCount * static_cast<std::size_t>(map.orientations()), 0);
+  std::vector<Bits256> masks(1);
   std::unordered_map<Bits256, std::uint32_t, HashBits> known = {{Bits256{}, 0}};
   const CellBox sampled = {domain_.min, map.domain().max + Cell::Ones()};
   for (int o = 0; o < map.orientations(); ++o) {
     for (const Direction d : kDirections) {
-      std::uint32_t* const plane = &index_[static_cast<std::size_t>(o * kDirectionCount + IndexOf(d)) * stride_];
+      std::uint32_t* const plane = &index[static_cast<std::size_t>(o * kDirectionCount + IndexOf(d)) * stride_];
       for (int z = 0; z < size_.z(); ++z) {
         std::vector<Bits256> column(static_cast<std::size_t>(size_.x()));
         for (int y = 1 - kMaskWindow; y < size_.y(); ++y) {
@@ -61,14 +74,16 @@ ContactMasks::ContactMasks(const ContactMap& map) {
             mask = mask.Up(kMaskWindow);
             mask.word[0] |= row;
             if (y < 0 || !mask.Any()) continue;
-            const auto [at, added] = known.try_emplace(mask, static_cast<std::uint32_t>(masks_.size()));
-            if (added) masks_.push_back(mask);
+            const auto [at, added] = known.try_emplace(mask, static_cast<std::uint32_t>(masks.size()));
+            if (added) masks.push_back(mask);
             plane[static_cast<std::size_t>((z * size_.y() + y) * size_.x() + x)] = at->second;
           }
         }
       }
     }
   }
+  index_ = std::move(index);
+  masks_ = std::move(masks);
 }
 
 }  // namespace feeler::planner

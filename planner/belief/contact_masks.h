@@ -6,6 +6,8 @@
 
 #include "feeler/core/direction.h"
 #include "feeler/core/lattice.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/bits256.h"
 #include "feeler/planner/contact/contact_map.h"
 
@@ -16,7 +18,8 @@ namespace feeler::planner {
 /// stored once and looked up by index; index 0 is the empty mask. Immutable; safe to read from many threads.
 class ContactMasks {
  public:
-  explicit ContactMasks(const ContactMap& map);
+  /// From the store, or made and kept there; its key stands for the map.
+  explicit ContactMasks(const ContactMap& map, const ArrayStore* store = nullptr);
 
   /// Index of the mask of a window: bit x + 16 y is set iff the step in direction `d` from displacement `corner` - (x,
   /// y, 0) is blocked. `corner` is the displacement r - h of the window's corner hypothesis. Displacements that no
@@ -28,14 +31,16 @@ class ContactMasks {
   }
   const Bits256& Mask(std::uint32_t index) const { return masks_[index]; }
   std::size_t distinct() const { return masks_.size(); }
-  std::size_t bytes() const { return index_.size() * sizeof(index_[0]) + masks_.size() * sizeof(Bits256); }
+  std::size_t bytes() const { return index_.bytes() + masks_.bytes(); }
 
  private:
+  void Fill(const ContactMap& map);
+
   CellBox domain_;  ///< of window corners; beyond it masks repeat
   Cell size_;
   std::size_t stride_ = 0;
-  std::vector<std::uint32_t> index_;
-  std::vector<Bits256> masks_;
+  SharedArray<std::uint32_t> index_;
+  SharedArray<Bits256> masks_;
 };
 
 }  // namespace feeler::planner

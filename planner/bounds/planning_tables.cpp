@@ -1,7 +1,13 @@
 #include "feeler/planner/bounds/planning_tables.h"
 
+#define XXH_INLINE_ALL
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <xxhash.h>
+
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "feeler/planner/belief/hull.h"
@@ -24,10 +30,46 @@ std::vector<int> OrientationsOf(const Problem& problem) {
   return orientations;
 }
 
+/// Changes when tables of the same problem come out otherwise.
+constexpr int kTablesVersion = 1;
+
+std::string HashOf(const ContactMap& map) {
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
+  XXH3_128bits_reset(state.get());
+  for (int o = 0; o < map.orientations(); ++o) {
+    const ContactMap::LayerView& layer = map.layer(o);
+    XXH3_128bits_update(state.get(), layer.blocked.data(), layer.blocked.size_bytes());
+    for (const auto& travel : layer.travel) XXH3_128bits_update(state.get(), travel.data(), travel.size_bytes());
+  }
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+/// All that the tables that are kept depend on.
+std::string KeyOf(const Problem& problem, const SolverOptions& options) {
+  const auto cells = [](const Cell& c) { return fmt::format("{} {} {}", c.x(), c.y(), c.z()); };
+  const CostWeights& cost = problem.cost;
+  return fmt::format(
+      "tables {}; map {} from {} to {}, {}; cost {} {} {} beyond {}; lengths {}; goal {} {}; pitches {}; "
+      "orientations {}; hull {}; solver {}; heuristic {}; generous {}",
+      kTablesVersion, HashOf(*problem.map), cells(problem.map->domain().min), cells(problem.map->domain().max),
+      problem.map->orientations(), cost.per_cell, cost.per_contact, cost.per_action,
+      fmt::join(cost.beyond_per_cell, " "), fmt::join(problem.move_lengths, " "), static_cast<int>(problem.goal),
+      cells(SpreadOf(problem)), problem.pitches, fmt::join(OrientationsOf(problem), " "),
+      cells(HullOf(problem.hypotheses).Size()), static_cast<int>(options.solver), static_cast<int>(options.heuristic),
+      problem.generous_workspace);
+}
+
 }  // namespace
 
-PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs)
-    : map_(problem.map), problem_(problem), options_(options), masks_(*problem.map) {
+PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs,
+                               const std::optional<ArrayStore>& store)
+    : map_(problem.map),
+      problem_(problem),
+      options_(options),
+      store_(store),
+      masks_(*problem.map, store ? &*store : nullptr) {
+  const ArrayStore* const kept = store_ ? &*store_ : nullptr;
   options_.cancellation = nullptr;
   options_.on_bounds = nullptr;
   options_.on_tables = nullptr;
@@ -36,13 +78,13 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
   pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
   const bool oriented = problem.map->orientations() > 1;
   if (oriented) {
-    flags_ = std::make_shared<const StepFlagsGrid>(*problem.map, jobs);
+    flags_ = std::make_shared<const StepFlagsGrid>(*problem.map, jobs, kept);
     oriented_pairs_ = std::make_shared<OrientedPairs>(flags_, costs);
     if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
       oriented_ = std::make_shared<OrientedCertificates>(problem, *flags_, costs, jobs, options.on_tables,
-                                                         options.cancellation);
+                                                         options.cancellation, kept);
       oriented_lines_ =
-          std::make_shared<OrientedLines>(problem, *flags_, costs, jobs, options.on_tables, options.cancellation);
+          std::make_shared<OrientedLines>(problem, *flags_, costs, jobs, options.on_tables, options.cancellation, kept);
     }
   }
   switch (options.heuristic) {
@@ -51,23 +93,23 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
       if (!problem.generous_workspace && LocalCertificateTable::Fits(problem)) {
         local_certificate_ = std::make_shared<LocalCertificateTable>(problem, motions);
       } else {
-        certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
+        certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem), kept);
       }
       break;
     case HeuristicKind::kCuboids:
       if (oriented_) break;  // there are no tables of cuboids over orientations
-      certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem));
+      certificate_ = std::make_shared<CertificateTable>(*problem.map, motions, SpreadOf(problem), kept);
       // Cuboids are bounded by single steps, in the middle of moves too: so must be what is left of them.
       cuboids_ = std::make_shared<CuboidTable>(
           *problem.map, masks_,
           motions.start > 0.0 ? CertificateTable(*problem.map, costs, SpreadOf(problem)) : *certificate_, costs,
-          SpreadOf(problem), HullOf(problem.hypotheses).Size(), jobs, options.cancellation);
+          SpreadOf(problem), HullOf(problem.hypotheses).Size(), jobs, options.cancellation, kept);
       break;
     case HeuristicKind::kLines:
       lines_ = oriented ? std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
-                                                      HullOf(problem.hypotheses).Size(), OrientationsOf(problem))
+                                                      HullOf(problem.hypotheses).Size(), OrientationsOf(problem), kept)
                         : std::make_shared<LineTable>(*problem.map, costs, SpreadOf(problem),
-                                                      Cell::Constant(LineTable::kLongest), std::vector<int>{0});
+                                                      Cell::Constant(LineTable::kLongest), std::vector<int>{0}, kept);
       break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
@@ -97,7 +139,7 @@ const PlanningTables::Filled& PlanningTables::filled() const {
     std::iota(problem.move_lengths.begin(), problem.move_lengths.end(), 1);
     SolverOptions options = options_;
     options.heuristic = HeuristicKind::kCertificate;  // the bound is made of them
-    filled_.tables = std::make_shared<const PlanningTables>(problem, options, Parallelism());
+    filled_.tables = BuildPlanningTables(problem, options, Parallelism(), store_ ? &*store_ : nullptr);
     if (!filled_.tables->certificate_) return;
     filled_.bound =
         std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
@@ -129,8 +171,11 @@ std::size_t PlanningTables::bytes() const {
 }
 
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
-                                                          Parallelism jobs) {
-  return std::make_shared<PlanningTables>(problem, options, jobs);
+                                                          Parallelism jobs, const ArrayStore* store) {
+  if (store == nullptr) return std::make_shared<PlanningTables>(problem, options, jobs);
+  const ArrayStore keyed = store->WithKey(KeyOf(problem, options));
+  const auto lock = keyed.Lock(options.cancellation);
+  return std::make_shared<PlanningTables>(problem, options, jobs, keyed);
 }
 
 }  // namespace feeler::planner

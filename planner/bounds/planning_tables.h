@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <optional>
 
+#include "feeler/planner/arrays/array_store.h"
 #include "feeler/planner/belief/belief_heuristic.h"
 #include "feeler/planner/belief/contact_masks.h"
 #include "feeler/planner/bounds/build_tables.h"
@@ -21,7 +23,9 @@ namespace feeler::planner {
 
 class PlanningTables {
  public:
-  PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs = {});
+  /// `store`: its key stands for problem and options.
+  PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs = {},
+                 const std::optional<ArrayStore>& store = std::nullopt);
 
   const ContactMasks& masks() const { return masks_; }
   /// Memory of all tables, those for the filled map included, as they stand: pairs are tabled when first asked for.
@@ -42,6 +46,7 @@ class PlanningTables {
   std::shared_ptr<const ContactMap> map_;
   Problem problem_;  ///< whose costs, goal and move lengths the tables are for
   SolverOptions options_;
+  std::optional<ArrayStore> store_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;

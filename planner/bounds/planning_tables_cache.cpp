@@ -54,7 +54,7 @@ std::shared_ptr<const PlanningTables> PlanningTablesCache::TablesFor(const Probl
     std::rotate(known.base() - 1, known.base(), entries_.end());
     return entries_.back().tables;
   }
-  auto tables = BuildPlanningTables(problem, options);
+  auto tables = BuildPlanningTables(problem, options, {}, store_.get());
   if (options.cancellation != nullptr && options.cancellation->cancelled()) return tables;  // may be incomplete
   if (entries_.size() == kMost) entries_.erase(entries_.begin());
   entries_.push_back({problem, options.solver, options.heuristic, std::move(tables)});

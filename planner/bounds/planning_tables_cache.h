@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "feeler/planner/bounds/build_tables.h"
@@ -13,6 +14,9 @@ namespace feeler::planner {
 class PlanningTablesCache {
  public:
   static constexpr std::size_t kMost = 4;
+
+  /// `store`: where they are kept for the other processes of the host; null: not.
+  explicit PlanningTablesCache(std::shared_ptr<const ArrayStore> store = nullptr) : store_(std::move(store)) {}
 
   /// Tables that serve the problem under the options. Law: a solver is led to the same bounds by them as by tables that
   /// were built for a problem that covers this one (`Serves`).
@@ -27,6 +31,7 @@ class PlanningTablesCache {
   };
   static bool Serves(const Entry& entry, const Problem& problem, const SolverOptions& options);
 
+  std::shared_ptr<const ArrayStore> store_;
   std::mutex mutex_;            // guards entries_
   std::vector<Entry> entries_;  // the last used comes last
 };

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "feeler/core/direction.h"
@@ -29,10 +32,18 @@ class ContactMap {
     std::vector<std::uint8_t> blocked;           ///< per displacement: 1 if the tool overlaps the target there
     std::vector<float> travel[kDirectionCount];  ///< per direction and displacement: cells to contact
   };
+  /// The same, in memory that the map keeps.
+  struct LayerView {
+    std::span<const std::uint8_t> blocked;
+    std::array<std::span<const float>, kDirectionCount> travel;
+  };
 
   /// Displacements are stored x fastest, then y, then z. Blocked displacements have travel 0.
   /// Throws InputError if sizes do not fit the domain.
   ContactMap(CellBox domain, std::vector<Layer> layers, Eigen::Vector3d phase, double margin_cells);
+  /// The same of layers that `owner` keeps: a file that is mapped.
+  ContactMap(CellBox domain, std::vector<LayerView> layers, std::shared_ptr<const void> owner, Eigen::Vector3d phase,
+             double margin_cells);
 
   const CellBox& domain() const { return domain_; }
   int orientations() const { return static_cast<int>(layers_.size()); }
@@ -56,15 +67,25 @@ class ContactMap {
   /// What a guarded move from this displacement returns.
   Outcome Predict(const Cell& displacement, const GuardedMove& move, int orientation = 0) const;
 
-  const Layer& layer(int orientation) const { return layers_[static_cast<std::size_t>(orientation)]; }
+  const LayerView& layer(int orientation) const { return layers_[static_cast<std::size_t>(orientation)]; }
+  Layer CopyOfLayer(int orientation) const;
+  std::size_t bytes() const {
+    return static_cast<std::size_t>(domain_.Count()) * layers_.size() * (1 + kDirectionCount * sizeof(float));
+  }
   std::size_t Index(const Cell& displacement) const {
     return GridIndex(size_, domain_.Clamp(displacement) - domain_.min);
   }
 
  private:
+  struct Unchecked {};
+  ContactMap(CellBox domain, std::vector<LayerView> layers, std::shared_ptr<const void> owner, Eigen::Vector3d phase,
+             double margin_cells, Unchecked tag);
+  void Check() const;
+
   CellBox domain_;
   Cell size_;
-  std::vector<Layer> layers_;
+  std::vector<LayerView> layers_;
+  std::shared_ptr<const void> owner_;  ///< of what they see
   Eigen::Vector3d phase_;
   double margin_cells_;
 };

@@ -3,11 +3,14 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
+#include <memory>
+#include <span>
 #include <system_error>
 #include <type_traits>
 #include <utility>
@@ -15,6 +18,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/planner/arrays/mapped_file.h"
 
 namespace feeler::planner {
 namespace {
@@ -24,11 +28,13 @@ namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "contact-map files are little-endian");
 
 constexpr std::string_view kMagic = "FEELERCM";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
+constexpr std::size_t kAlignment = 64;  // of an array, from the beginning of the file
 constexpr std::int64_t kMaxCells = std::int64_t{1} << 31;
 
 /// Layout: magic, version u32, orientations u32, domain min and max i32 x 6, phase f64 x 3, margin f64, then per layer
-/// the blocked flags and the six travel tables, then XXH3 (64 bits) of all before it.
+/// the blocked flags and the six travel tables, each from a multiple of 64 bytes on, then XXH3 (64 bits) of all before
+/// it. In version 1 they follow without a gap.
 class MapWriter {
  public:
   template <class T>
@@ -41,6 +47,7 @@ class MapWriter {
   void Put(const T& value) {
     Put(&value, 1);
   }
+  void Align() { bytes_.resize((bytes_.size() + kAlignment - 1) / kAlignment * kAlignment, '\0'); }
   std::string& bytes() { return bytes_; }
 
  private:
@@ -61,6 +68,16 @@ class MapReader {
     T value;
     Get(&value, 1);
     return value;
+  }
+  void Align() { at_ = std::min(bytes_.size(), (at_ + kAlignment - 1) / kAlignment * kAlignment); }
+  /// An array where it lies.
+  template <class T>
+  std::span<const T> See(std::size_t count) {
+    Align();
+    if (count > (bytes_.size() - at_) / sizeof(T)) Fail("is truncated");
+    const std::span<const T> values(reinterpret_cast<const T*>(bytes_.data() + at_), count);
+    at_ += values.size_bytes();
+    return values;
   }
   std::size_t left() const { return bytes_.size() - at_; }
   [[noreturn]] void Fail(const std::string& what) const {
@@ -84,49 +101,82 @@ std::string EncodeContactMap(const ContactMap& map) {
   writer.Put(map.phase().data(), 3);
   writer.Put(map.margin_cells());
   for (int i = 0; i < map.orientations(); ++i) {
-    const ContactMap::Layer& layer = map.layer(i);
+    const ContactMap::LayerView& layer = map.layer(i);
+    writer.Align();
     writer.Put(layer.blocked.data(), layer.blocked.size());
-    for (const auto& travel : layer.travel) writer.Put(travel.data(), travel.size());
+    for (const auto& travel : layer.travel) {
+      writer.Align();
+      writer.Put(travel.data(), travel.size());
+    }
   }
   writer.Put(std::uint64_t{XXH3_64bits(writer.bytes().data(), writer.bytes().size())});
   return std::move(writer.bytes());
 }
 
-ContactMap DecodeContactMap(std::string_view bytes, const std::string& where) {
-  MapReader reader(bytes, where);
+namespace {
+
+struct Head {
+  std::uint32_t version = 0;
+  std::uint32_t orientations = 0;
+  CellBox domain;
+  Eigen::Vector3d phase;
+  double margin_cells = 0.0;
+};
+
+/// What comes before the layers, and whether the checksum fits.
+Head ReadHead(std::string_view bytes, MapReader& reader) {
+  Head head;
   std::array<char, kMagic.size()> magic{};
   reader.Get(magic.data(), magic.size());
   if (std::string_view(magic.data(), magic.size()) != kMagic) reader.Fail("has another format");
-  if (const auto version = reader.Get<std::uint32_t>(); version != kVersion) {
-    reader.Fail("has format version " + std::to_string(version) + " instead of " + std::to_string(kVersion));
+  head.version = reader.Get<std::uint32_t>();
+  if (head.version < 1 || head.version > kVersion) {
+    reader.Fail("has format version " + std::to_string(head.version) + " instead of " + std::to_string(kVersion));
   }
   std::uint64_t checksum = 0;
   if (reader.left() < sizeof(checksum)) reader.Fail("is truncated");
   const std::size_t content = bytes.size() - sizeof(checksum);
   std::memcpy(&checksum, bytes.data() + content, sizeof(checksum));
   if (checksum != XXH3_64bits(bytes.data(), content)) reader.Fail("is damaged (checksum)");
+  head.orientations = reader.Get<std::uint32_t>();
+  reader.Get(head.domain.min.data(), 3);
+  reader.Get(head.domain.max.data(), 3);
+  reader.Get(head.phase.data(), 3);
+  head.margin_cells = reader.Get<double>();
+  if (head.domain.Count() <= 0 || head.domain.Count() > kMaxCells) reader.Fail("has an absurd size");
+  return head;
+}
 
-  const auto orientations = reader.Get<std::uint32_t>();
-  CellBox domain;
-  reader.Get(domain.min.data(), 3);
-  reader.Get(domain.max.data(), 3);
-  Eigen::Vector3d phase;
-  reader.Get(phase.data(), 3);
-  const auto margin_cells = reader.Get<double>();
-  const std::int64_t count = domain.Count();
-  if (count <= 0 || count > kMaxCells) reader.Fail("has an absurd size");
-  std::vector<ContactMap::Layer> layers(0);
-  for (std::uint32_t i = 0; i < orientations; ++i) {
-    ContactMap::Layer layer;
-    layer.blocked.resize(static_cast<std::size_t>(count));
-    reader.Get(layer.blocked.data(), layer.blocked.size());
-    for (auto& travel : layer.travel) {
-      travel.resize(static_cast<std::size_t>(count));
-      reader.Get(travel.data(), travel.size());
-    }
-    layers.push_back(std::move(layer));
+/// Layers where they lie, in memory that `owner` keeps.
+ContactMap SeeLayers(const Head& head, MapReader& reader, std::shared_ptr<const void> owner) {
+  const auto count = static_cast<std::size_t>(head.domain.Count());
+  std::vector<ContactMap::LayerView> layers;
+  for (std::uint32_t i = 0; i < head.orientations; ++i) {
+    ContactMap::LayerView& layer = layers.emplace_back();
+    layer.blocked = reader.See<std::uint8_t>(count);
+    for (auto& travel : layer.travel) travel = reader.See<float>(count);
   }
-  return ContactMap(domain, std::move(layers), phase, margin_cells);
+  return ContactMap(head.domain, std::move(layers), std::move(owner), head.phase, head.margin_cells);
+}
+
+}  // namespace
+
+ContactMap DecodeContactMap(std::string_view bytes, const std::string& where) {
+  MapReader reader(bytes, where);
+  const Head head = ReadHead(bytes, reader);
+  const auto count = static_cast<std::size_t>(head.domain.Count());
+  std::vector<ContactMap::Layer> layers;
+  const auto get = [&](auto& values) {
+    if (head.version > 1) reader.Align();
+    values.resize(count);
+    reader.Get(values.data(), count);
+  };
+  for (std::uint32_t i = 0; i < head.orientations; ++i) {
+    ContactMap::Layer& layer = layers.emplace_back();
+    get(layer.blocked);
+    for (auto& travel : layer.travel) get(travel);
+  }
+  return ContactMap(head.domain, std::move(layers), head.phase, head.margin_cells);
 }
 
 void WriteContactMap(const fs::path& file, const ContactMap& map) {
@@ -136,15 +186,14 @@ void WriteContactMap(const fs::path& file, const ContactMap& map) {
 }
 
 ContactMap ReadContactMap(const fs::path& file) {
-  // Maps over orientation come to hundreds of megabytes: read in one piece.
-  std::error_code error;
-  const auto size = fs::file_size(file, error);
-  std::ifstream in(file, std::ios::binary);
-  std::string bytes(error ? 0 : static_cast<std::size_t>(size), '\0');
-  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (error || !in)
+  const auto mapped = MappedFile::Open(file);
+  if (!mapped)
     throw InputError(file.string(), "the contact map cannot be read", "check that the file is there and may be read");
-  return DecodeContactMap(bytes, file.string());
+  const std::string where = file.string();
+  MapReader reader(mapped->bytes(), where);
+  const Head head = ReadHead(mapped->bytes(), reader);
+  if (head.version < kVersion) return DecodeContactMap(mapped->bytes(), where);
+  return SeeLayers(head, reader, mapped);
 }
 
 }  // namespace feeler::planner

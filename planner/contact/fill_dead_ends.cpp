@@ -39,7 +39,7 @@ std::shared_ptr<const ContactMap> FillDeadEnds(const ContactMap& map) {
         if (domain.Contains(next) && dead_end(next)) open.push_back(next);
       }
     }
-    ContactMap::Layer layer = map.layer(o);
+    ContactMap::Layer layer = map.CopyOfLayer(o);
     ForEachCell(domain, [&](const Cell& cell) {
       if (filled[map.Index(cell)] == 0) return;
       layer.blocked[map.Index(cell)] = 1;

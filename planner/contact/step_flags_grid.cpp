@@ -1,19 +1,30 @@
 #include "feeler/planner/contact/step_flags_grid.h"
 
+#include <utility>
+#include <vector>
+
 #include "feeler/core/worker_pool.h"
 
 namespace feeler::planner {
-StepFlagsGrid::StepFlagsGrid(const ContactMap& map, Parallelism jobs)
+
+StepFlagsGrid::StepFlagsGrid(const ContactMap& map, Parallelism jobs, const ArrayStore* store)
     : domain_{map.domain().min - Cell::Ones(), map.domain().max + Cell::Ones()},
       size_(domain_.Size()),
       flags_(static_cast<std::size_t>(map.orientations())),
       regions_(flags_.size()) {
+  std::vector<SharedArray<std::uint8_t>*> all;
+  for (auto& of_orientation : flags_) all.push_back(&of_orientation);
+  const bool taken = store != nullptr && store->Take("step flags", all);
   ParallelFor(flags_.size(), jobs, [&](std::size_t o) {
-    std::vector<std::uint8_t>& flags = flags_[o];
-    flags.reserve(static_cast<std::size_t>(domain_.Count()));
-    ForEachCell(domain_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, static_cast<int>(o))); });
+    if (!taken) {
+      std::vector<std::uint8_t> flags;
+      flags.reserve(static_cast<std::size_t>(domain_.Count()));
+      ForEachCell(domain_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, static_cast<int>(o))); });
+      flags_[o] = std::move(flags);
+    }
     regions_[o] = Active(static_cast<int>(o));
   });
+  if (!taken && store != nullptr) store->Keep("step flags", all);
 }
 
 /// True if `holds` of every cell of the layer `at` of a box.

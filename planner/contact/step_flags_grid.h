@@ -6,6 +6,8 @@
 
 #include "feeler/core/lattice_grid.h"
 #include "feeler/core/parallelism.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/contact/active_region.h"
 #include "feeler/planner/contact/contact_map.h"
 
@@ -15,7 +17,8 @@ namespace feeler::planner {
 /// is the domain of the map and one cell beyond it, where everything repeats. Immutable.
 class StepFlagsGrid {
  public:
-  StepFlagsGrid(const ContactMap& map, Parallelism jobs);
+  /// From the store, or made and kept there; its key stands for the map.
+  StepFlagsGrid(const ContactMap& map, Parallelism jobs, const ArrayStore* store = nullptr);
   std::size_t bytes() const { return flags_.size() * static_cast<std::size_t>(domain_.Count()); }
 
   int orientations() const { return static_cast<int>(flags_.size()); }
@@ -41,7 +44,7 @@ class StepFlagsGrid {
 
   CellBox domain_;
   Cell size_;
-  std::vector<std::vector<std::uint8_t>> flags_;
+  std::vector<SharedArray<std::uint8_t>> flags_;
   std::vector<Region> regions_;
 };
 

@@ -1,5 +1,6 @@
 #include "feeler/planner/family/family_solver.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "feeler/core/orientation_lattice.h"
@@ -20,7 +21,9 @@ FamilySolver::FamilySolver(const Task& task, std::shared_ptr<const ContactMap> m
   Validate(solver_);
   needs_experience_ = solver_.solver == SolverKind::kERtdpBel && options.experience != ExperienceKind::kNone;
   if (!tables_ && !family.problems.empty()) {
-    tables_ = BuildPlanningTables(ProblemOf(LargestExtents(family)), WithFamilyBudget(solver_, traits_), options.jobs);
+    const Parallelism jobs(std::max(options.jobs.threads(), options.table_jobs.threads()));
+    tables_ = BuildPlanningTables(ProblemOf(LargestExtents(family)), WithFamilyBudget(solver_, traits_), jobs,
+                                  options.store.get());
   }
 }
 

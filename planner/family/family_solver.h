@@ -21,6 +21,7 @@ class FamilySolver {
   /// Law: depends on its arguments and those of the constructor alone (what a time limit stopped is exempt).
   SolverResult Solve(const Extents& extents, const std::optional<SimilarProblem>& similar) const;
 
+  const PlanningTables& tables() const { return *tables_; }
   /// Whether problems are solved with the policies of similar ones.
   bool needs_experience() const { return needs_experience_; }
   Problem ProblemOf(const Extents& extents) const { return MakeCuboidProblem(task_, map_, extents); }

@@ -65,6 +65,9 @@ struct PreprocessOptions {
   Parallelism jobs;
   /// Tables made by an earlier call of BuildPlanningTables for this task and these solver options; null to build them.
   std::shared_ptr<const PlanningTables> tables;
+  /// Where tables that are built here are kept for the other processes of the host; null: not.
+  std::shared_ptr<const ArrayStore> store;
+  Parallelism table_jobs;  ///< threads that build tables, if more than `jobs`: processes that wait for them leave cores
   /// The problems of the family to solve and hand over, in lexicographic order; null: all. Order, tables and choice of
   /// experience are those of the whole family, so the results are, too: other problems are solved along the way where
   /// their policies are needed, and not handed over.

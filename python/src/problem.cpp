@@ -10,7 +10,7 @@ namespace {
 
 nb::object TravelOf(const planner::ContactMap& map, int direction, int orientation) {
   const Cell size = map.domain().Size();
-  const auto& values = map.layer(orientation).travel[direction];
+  const auto& values = map.layer(orientation).travel[static_cast<std::size_t>(direction)];
   // x fastest in the map: (z, y, x) in rows, handed out as (x, y, z).
   std::vector<float> copy(values.size());
   const auto nx = static_cast<std::size_t>(size.x());

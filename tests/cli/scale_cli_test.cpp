@@ -5,7 +5,9 @@
 //   - a shard that is there twice, missing, unfinished, overlapping or foreign is refused in one line, and nothing is
 //     left behind or overwritten;
 //   - 1, 2 and 8 ranks make the same content as none; a lost rank ends the job, and the same command goes on;
-//   - ranks that differ in task or command, or of which one fails before it serves, are refused, once.
+//   - ranks of a host make contact map and tables once, and share them;
+//   - ranks that differ in task or command, or of which one fails before it serves, are refused, once;
+//   - an experiment on ranks holds what it holds without.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -299,6 +301,40 @@ TEST_F(RanksTest, MakeTheSameDatabaseAtAnyNumber) {
       EXPECT_NE(result.out.find("\"ranks\""), std::string::npos) << result.out;
     }
   }
+}
+
+TEST_F(RanksTest, MakeContactMapAndTablesOnceAHost) {
+  const std::string folder = ScratchFolder("cold");
+  const std::string cache = folder + "/cache";
+  const auto files = [&](const char* extension) {
+    std::ptrdiff_t count = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(cache)) {
+      if (entry.path().extension() == extension) ++count;
+    }
+    return count;
+  };
+  const std::string arguments = " \"$FEELER\" preprocess --task plug --family 2x2x2..3 --out " + folder;
+  const std::string mpirun = "export FEELER_CACHE_DIR='" + cache + "'; mpirun --allow-run-as-root --oversubscribe -n 3";
+  const CommandResult cold = Shell(mpirun + arguments + "/cold.db");
+  ASSERT_EQ(cold.exit_code, 0) << cold.out;
+  EXPECT_EQ(files(".contact-map"), 1);
+  EXPECT_EQ(files(".lock"), 0);
+  const std::ptrdiff_t tables = files(".tables");
+  EXPECT_GT(tables, 0);
+  const CommandResult warm = Shell(mpirun + arguments + "/warm.db");
+  ASSERT_EQ(warm.exit_code, 0) << warm.out;
+  EXPECT_EQ(files(".tables"), tables);
+  EXPECT_EQ(warm.out.find("contact map:"), std::string::npos) << warm.out;
+  EXPECT_EQ(Digest(folder + "/warm.db"), Digest(folder + "/cold.db"));
+  // A cache that cannot be written: one line, and the job goes on.
+  std::filesystem::remove_all(cache);
+  WriteFile(cache, "no folder");
+  const CommandResult without = Shell(mpirun + arguments + "/without.db");
+  ASSERT_EQ(without.exit_code, 0) << without.out;
+  const std::size_t said = without.out.find("FEELER_CACHE_DIR");
+  ASSERT_NE(said, std::string::npos) << without.out;
+  EXPECT_EQ(without.out.find("FEELER_CACHE_DIR", said + 1), std::string::npos) << without.out;
+  EXPECT_EQ(Digest(folder + "/without.db"), Digest(folder + "/cold.db"));
 }
 
 TEST_F(RanksTest, MakeTheSameRecords) {

@@ -21,12 +21,12 @@ inline Problem OrientedProblem(std::uint64_t seed, std::uint64_t index, RandomPr
   for (int tries = 0;; ++tries) {
     LatticeProblemData data = RandomProblem(seed, index + 1000 * static_cast<std::uint64_t>(tries), options);
     Problem problem = MakeLatticeProblem(data);
-    std::vector<ContactMap::Layer> layers = {problem.map->layer(0)};
+    std::vector<ContactMap::Layer> layers = {problem.map->CopyOfLayer(0)};
     for (int o = 1; o < orientations; ++o) {
       // A cell of the target moves: shapes that differ a little, as turned ones do.
       data.target[random.Index(data.target.size())] += UnitCell(kDirections[random.Index(options.three_d ? 6 : 4)]);
       try {
-        layers.push_back(MakeLatticeProblem(data).map->layer(0));
+        layers.push_back(MakeLatticeProblem(data).map->CopyOfLayer(0));
       } catch (const InputError&) {  // the start is blocked
         break;
       }

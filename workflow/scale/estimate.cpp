@@ -8,12 +8,16 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
+#include <functional>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <system_error>
 
 #include "feeler/core/error.h"
 #include "feeler/core/interrupted.h"
 #include "feeler/core/worker_pool.h"
+#include "feeler/planner/bounds/planning_tables.h"
 #include "feeler/planner/family/family_solver.h"
 #include "feeler/policies/storage/database_sink.h"
 #include "feeler/workflow/setup/database_builder.h"
@@ -47,17 +51,45 @@ class ScratchFolder {
   std::string path_;
 };
 
-/// Seconds to commit one of these results to a database.
+/// Seconds to commit one of these problems to a database.
 double CommitSeconds(const PlanningSetup& setup, const planner::PreprocessOptions& options,
-                     const std::vector<planner::Extents>& extents, const std::vector<planner::SolverResult>& results) {
+                     const std::vector<policies::StoredProblem>& problems) {
   const ScratchFolder folder;
   policies::Database database = policies::Database::Create(folder.File("sample.db"), IdentityOf(setup, options));
   const auto begin = std::chrono::steady_clock::now();
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    database.Put(policies::ToStoredProblem(extents[i], options.solver, results[i]));
-  }
+  for (const policies::StoredProblem& problem : problems) database.Put(problem);
   const double all_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  return all_s / static_cast<double>(std::max<std::size_t>(1, results.size()));
+  return all_s / static_cast<double>(std::max<std::size_t>(1, problems.size()));
+}
+
+/// The problems in the order in which ranks are given them.
+std::vector<planner::Extents> LargestFirst(const planner::ProblemFamily& family) {
+  std::vector<planner::Extents> order = family.problems;
+  std::ranges::stable_sort(order, std::ranges::greater(), [](const planner::Extents& e) { return e.Count(); });
+  return order;
+}
+
+/// `count` places of so many, the first and the last among them, evenly spaced.
+std::vector<std::size_t> Spaced(std::size_t count, std::size_t all) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < count; ++i) places.push_back(count == 1 ? 0 : i * (all - 1) / (count - 1));
+  return places;
+}
+
+/// Tables of the family; their time and what is shared of them.
+planner::FamilySolver SolverOf(const PlanningSetup& setup, const planner::ProblemFamily& family,
+                               const planner::PreprocessOptions& options, FamilyEstimate& estimate) {
+  const double before_s = ProcessSeconds();
+  planner::FamilySolver solver(setup.task(), setup.map, family, options);
+  estimate.tables_s = ProcessSeconds() - before_s;
+  estimate.shared_bytes = static_cast<std::int64_t>(setup.map->bytes() + solver.tables().bytes());
+  return solver;
+}
+
+std::int64_t PeakBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
 /// Times of all places from those of the sampled ones (in increasing order): that of the nearest.
@@ -102,18 +134,13 @@ FamilyEstimate EstimateFamily(const PlanningSetup& setup, const planner::Problem
   const std::size_t count = family.problems.size();
   estimate.problems = static_cast<std::int64_t>(count);
   if (count == 0) return estimate;
-  std::vector<planner::Extents> order = family.problems;
-  std::ranges::stable_sort(order, std::ranges::greater(), [](const planner::Extents& e) { return e.Count(); });
-
+  const std::vector<planner::Extents> order = LargestFirst(family);
   const std::size_t taken = std::clamp<std::size_t>(static_cast<std::size_t>(sample), 1, count);
-  std::vector<std::size_t> places;
-  for (std::size_t i = 0; i < taken; ++i) places.push_back(taken == 1 ? 0 : i * (count - 1) / (taken - 1));
+  const std::vector<std::size_t> places = Spaced(taken, count);
   std::vector<planner::Extents> extents;
   for (const std::size_t place : places) extents.push_back(order[place]);
 
-  const double before_s = ProcessSeconds();
-  const planner::FamilySolver solver(setup.task(), setup.map, family, options);
-  estimate.tables_s = ProcessSeconds() - before_s;
+  const planner::FamilySolver solver = SolverOf(setup, family, options, estimate);
   std::vector<planner::SolverResult> results(taken);
   const bool all = ParallelFor(
       taken, options.jobs, [&](std::size_t i) { results[i] = solver.Solve(extents[i], std::nullopt); },
@@ -129,10 +156,44 @@ FamilyEstimate EstimateFamily(const PlanningSetup& setup, const planner::Problem
   estimate.piece_s = FromNearest(count, places, seconds);
   for (const double piece_s : estimate.piece_s) estimate.cpu_s += piece_s;
   estimate.cpu_error = taken == count ? 0.0 : std::max(HalfError(seconds, 0), HalfError(seconds, 1));
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  estimate.rank_bytes = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
-  estimate.commit_s = CommitSeconds(setup, options, extents, results);
+  estimate.rank_bytes = PeakBytes();
+  std::vector<policies::StoredProblem> stored;
+  for (std::size_t i = 0; i < taken; ++i)
+    stored.push_back(policies::ToStoredProblem(extents[i], options.solver, results[i]));
+  estimate.commit_s = CommitSeconds(setup, options, stored);
+  return estimate;
+}
+
+FamilyEstimate EstimateFromTimes(const PlanningSetup& setup, const planner::ProblemFamily& family,
+                                 const planner::PreprocessOptions& given, policies::Database& measured) {
+  planner::PreprocessOptions options = given;
+  options.openings = setup.opening == env::Opening::kOpen;
+  FamilyEstimate estimate;
+  const std::vector<planner::Extents> order = LargestFirst(family);
+  estimate.problems = std::ssize(order);
+  estimate.sampled = estimate.problems;
+  if (order.empty()) return estimate;
+  std::map<planner::Extents, double> times;
+  for (const policies::StoredProblem& problem : measured.List()) times[problem.extents] = problem.cpu_s;
+  for (const planner::Extents& extents : order) {
+    const auto at = times.find(extents);
+    if (at == times.end()) {
+      throw InputError("--times", "holds no problem " + planner::ToString(extents, setup.task()),
+                       "give a whole database of this family");
+    }
+    estimate.piece_s.push_back(at->second);
+    estimate.cpu_s += at->second;
+  }
+  estimate.sample_cpu_s = estimate.cpu_s;
+  constexpr std::size_t kCommits = 64;
+  const planner::FamilySolver solver = SolverOf(setup, family, options, estimate);
+  solver.Solve(order.front(), std::nullopt);  // for its memory
+  estimate.rank_bytes = PeakBytes();
+  std::vector<policies::StoredProblem> stored;
+  for (const std::size_t place : Spaced(std::min(kCommits, order.size()), order.size())) {
+    if (auto problem = measured.Get(order[place])) stored.push_back(*std::move(problem));
+  }
+  estimate.commit_s = CommitSeconds(setup, options, stored);
   return estimate;
 }
 

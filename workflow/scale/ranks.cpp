@@ -17,6 +17,8 @@ int FirstOf(const char* open_mpi, const char* mpich, int fallback) {
 
 int LaunchedRanks() { return FirstOf("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", 1); }
 
+int LaunchedOnHost() { return FirstOf("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", 1); }
+
 int LaunchedRank() { return FirstOf("OMPI_COMM_WORLD_RANK", "PMI_RANK", 0); }
 
 }  // namespace feeler::workflow

@@ -33,10 +33,6 @@ class Ranks {
   virtual int rank() const = 0;
   virtual int size() const = 0;
 
-  /// Runs `load` on one rank of each host, then on its others: what the first leaves in the cache they read. A rank
-  /// that never comes here holds up nobody. Throws Interrupted after a cancellation.
-  virtual void OncePerHost(const std::function<void()>& load) = 0;
-
   /// Rank 0: waits for the others and compares their identities with this one, a JSON object of what must be equal on
   /// all. Throws Error for a rank that failed, InputError for one that differs, naming rank, host and what.
   virtual void Assemble(const std::string& identity) = 0;
@@ -59,5 +55,7 @@ class Ranks {
 int LaunchedRanks();
 /// Which of them this one is.
 int LaunchedRank();
+/// How many of them are on this host, as the launcher says; 1 where it does not.
+int LaunchedOnHost();
 
 }  // namespace feeler::workflow

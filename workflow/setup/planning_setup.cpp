@@ -48,7 +48,7 @@ PlanningSetup LoadPlanningSetup(const std::string& task, const PlanningSetupOpti
   setup.cost_kind = options.cost_kind;
   setup.opening = options.opening;
   setup.map = std::make_shared<const planner::ContactMap>(
-      env::GetContactMap(setup.model, options.opening, options.jobs, options.progress));
+      env::GetContactMap(setup.model, options.opening, options.jobs, options.progress, options.on_cache_failure));
   setup.fingerprint = env::Fingerprint(setup.model, options.opening);
   return setup;
 }

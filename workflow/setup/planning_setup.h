@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,6 +22,7 @@ struct PlanningSetupOptions {
   std::optional<CostWeights> cost;           ///< instead of either
   Parallelism jobs;
   ProgressCallback progress;  ///< while the contact map is built; not called when it comes from the cache
+  std::function<void(const std::string& reason)> on_cache_failure;  ///< the contact map could not be kept
 };
 
 /// A task with everything that planning for it needs.

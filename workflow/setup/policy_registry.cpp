@@ -68,7 +68,7 @@ class StoredPolicies {
 struct Shared {
   std::shared_ptr<StoredPolicies> stored;  ///< null without a database
   PolicyOptions options;
-  std::shared_ptr<planner::PlanningTablesCache> tables = std::make_shared<planner::PlanningTablesCache>();
+  std::shared_ptr<planner::PlanningTablesCache> tables = std::make_shared<planner::PlanningTablesCache>(options.store);
   std::shared_ptr<VisualGoalOnce> visual_goal = std::make_shared<VisualGoalOnce>();
   std::shared_ptr<RegionCache> regions = std::make_shared<RegionCache>();
 };

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "feeler/planner/arrays/array_store.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/online_policy.h"
@@ -34,8 +35,9 @@ using PolicyFactory = std::function<std::unique_ptr<policies::Policy>(const Poli
 struct PolicyOptions {
   int tbl_actions = 100;  ///< sampled per planning step by touch-based localization; 0: every action
   policies::OnlineOptions online;
-  std::optional<policies::SpiralTuning> spiral;  ///< default: as derived for the task (DerivedSpiral)
-  double hybrid_threshold_m = 0.0;               ///< half width of the uncertainty; 0: DerivedHybridThreshold
+  std::optional<policies::SpiralTuning> spiral;      ///< default: as derived for the task (DerivedSpiral)
+  std::shared_ptr<const planner::ArrayStore> store;  ///< of bound tables for the processes of the host; null: none
+  double hybrid_threshold_m = 0.0;                   ///< half width of the uncertainty; 0: DerivedHybridThreshold
 };
 /// Parses "key=value" settings of `--policy-option`: tbl-actions, online-seconds, online-expansions, spiral-pitch,
 /// spiral-speed, spiral-force, hybrid-threshold. Throws InputError listing the keys for an unknown one.

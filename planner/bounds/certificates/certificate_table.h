@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "feeler/core/lattice.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_walks.h"
 #include "feeler/planner/contact/contact_map.h"
@@ -24,7 +26,9 @@ class CertificateTable {
   static constexpr int kMasks = 64;
   static constexpr std::uint16_t kUnreachable = kNoCertificate;
 
-  CertificateTable(const ContactMap& map, const StepCosts& costs, const Cell& spread);
+  /// From the store, or made and kept there; its key stands for map, goal and the costs of moves.
+  CertificateTable(const ContactMap& map, const StepCosts& costs, const Cell& spread,
+                   const ArrayStore* store = nullptr);
 
   const CertificateGrid& grid() const { return grid_; }
   /// Offset from a hypothesis to the neighbour of bit i (+x, -x, +y, ...).
@@ -40,13 +44,13 @@ class CertificateTable {
   std::uint32_t Further(const Cell& displacement, int mask, int orientation) const {
     return At(displacement, mask, orientation) + (mask == 0 ? 0 : grid_.WayBack(displacement));
   }
-  std::size_t bytes() const { return values_.size() * sizeof(values_[0]); }
+  std::size_t bytes() const { return values_.bytes(); }
 
  private:
   CertificateGrid grid_;
   int orientations_ = 1;
   std::array<Cell, 6> neighbours_;
-  std::vector<std::uint16_t> values_;
+  SharedArray<std::uint16_t> values_;
 };
 
 }  // namespace feeler::planner

@@ -48,7 +48,7 @@ struct CuboidTable::Scratch {
 
 CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
                          const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs,
-                         const CancellationToken* cancellation)
+                         const CancellationToken* cancellation, const ArrayStore* store)
     : spread_(spread), largest_(largest.cwiseMin(kLongest)) {
   const TableUnits units(costs);
   unit_ = units.unit;
@@ -59,10 +59,23 @@ CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const
   mirrored_ = region.mirrored;
   free_above_ = region.free_above;
   free_below_ = region.free_below;
-  FillFlags(map);
   FitIntoMemory(map.orientations());
   planes_.resize(static_cast<std::size_t>(largest_.prod() * map.orientations()));
-  const Source source{masks, certificates};
+  std::vector<SharedArray<std::uint32_t>*> all;
+  ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
+    for (int o = 0; o < map.orientations() && !Goal(size); ++o) {
+      Plane& plane = planes_[PlaneIndex(size, o)];
+      plane = Shape(size);
+      all.push_back(&plane.values);
+    }
+  });
+  if (store != nullptr && store->Take("cuboids", all)) return;
+  FillFlags(map);
+  if (FillAll(map, {masks, certificates}, jobs, cancellation) && store != nullptr) store->Keep("cuboids", all);
+}
+
+bool CuboidTable::FillAll(const ContactMap& map, const Source& source, Parallelism jobs,
+                          const CancellationToken* cancellation) {
   // A cuboid is cut into smaller ones: their extents have a smaller sum. Those of equal sum are independent.
   std::vector<Scratch> scratch(static_cast<std::size_t>(jobs.threads()));
   for (int sum = 4; sum <= largest_.sum(); ++sum) {
@@ -78,7 +91,9 @@ CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const
           return [&, &mine = scratch[next++]](std::size_t i) { Fill(source, level[i].first, level[i].second, mine); };
         },
         cancellation);
+    if (cancellation != nullptr && cancellation->cancelled()) return false;
   }
+  return true;
 }
 
 void CuboidTable::FillFlags(const ContactMap& map) {
@@ -178,7 +193,6 @@ std::uint64_t CuboidTable::BestPartition(const Source& source, const std::vector
 
 void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch) {
   Plane& plane = planes_[PlaneIndex(size, orientation)];
-  plane = Shape(size);
   const Cell& stored = plane.stored;
   // The OR over the cuboid of the flags of its hypotheses.
   Cell shape = active_.Size();
@@ -189,15 +203,16 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
     OrAlong(axis, size[axis], before, scratch.flags, shape, scratch.buffer);
     scratch.flags.swap(scratch.buffer);
   }
-  plane.values.assign(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
-                          static_cast<std::size_t>(stored.z()),
-                      kUnreachable);
-  SplittingSteps(source, size, orientation, plane, scratch);
-  SilentSteps(static_cast<std::uint32_t>(size.prod()) * free_units_, plane, scratch.flags);
+  std::vector<std::uint32_t> values(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
+                                        static_cast<std::size_t>(stored.z()),
+                                    kUnreachable);
+  SplittingSteps(source, size, orientation, plane, values, scratch);
+  SilentSteps(static_cast<std::uint32_t>(size.prod()) * free_units_, stored, scratch.flags, values);
+  plane.values = std::move(values);
 }
 
-void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int orientation, Plane& plane,
-                                 Scratch& scratch) const {
+void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int orientation, const Plane& plane,
+                                 std::vector<std::uint32_t>& values, Scratch& scratch) const {
   const ContactMasks& masks = source.masks;
   const Cell& stored = plane.stored;
   const auto whole = static_cast<std::uint32_t>(size.prod());
@@ -214,7 +229,7 @@ void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int ori
       return;
     }
     const Cell displacement = active_.min + cell;
-    std::uint32_t& best = plane.values[here];
+    std::uint32_t& best = values[here];
     for (const Direction d : kDirections) {
       const unsigned bit = 1U << IndexOf(d);
       const int next = cell[AxisOf(d)] + SignOf(d);
@@ -244,33 +259,34 @@ void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int ori
   });
 }
 
-void CuboidTable::SilentSteps(std::uint32_t step_cost, Plane& plane, const std::vector<std::uint8_t>& flags) {
-  const auto strides = GridStrides(plane.stored);
+void CuboidTable::SilentSteps(std::uint32_t step_cost, const Cell& stored, const std::vector<std::uint8_t>& flags,
+                              std::vector<std::uint32_t>& values) {
+  const auto strides = GridStrides(stored);
   const auto relax = [&](std::size_t here) {
     if (flags[here] == kBlockedSteps) return false;
-    const std::uint32_t before = plane.values[here];
+    const std::uint32_t before = values[here];
     std::uint32_t best = before;
     for (const Direction d : kDirections) {
       if ((flags[here] >> IndexOf(d) & 1) != 0) continue;
-      const std::uint32_t there = plane.values[static_cast<std::size_t>(
+      const std::uint32_t there = values[static_cast<std::size_t>(
           static_cast<std::int64_t>(here) + SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))])];
       if (there < kUnreachable - step_cost) best = std::min(best, there + step_cost);
     }
-    plane.values[here] = best;
+    values[here] = best;
     return best < before;
   };
   for (bool changed = true; changed;) {
     changed = false;
-    for (std::size_t i = 0; i < plane.values.size(); ++i) changed = relax(i) || changed;
+    for (std::size_t i = 0; i < values.size(); ++i) changed = relax(i) || changed;
     if (!changed) break;
     changed = false;
-    for (std::size_t i = plane.values.size(); i-- > 0;) changed = relax(i) || changed;
+    for (std::size_t i = values.size(); i-- > 0;) changed = relax(i) || changed;
   }
 }
 
 std::size_t CuboidTable::bytes() const {
   std::size_t bytes = 0;
-  for (const Plane& plane : planes_) bytes += plane.values.size() * sizeof(plane.values[0]);
+  for (const Plane& plane : planes_) bytes += plane.values.bytes();
   return bytes;
 }
 

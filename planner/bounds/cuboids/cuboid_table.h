@@ -7,6 +7,8 @@
 #include "feeler/core/lattice.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/contact_masks.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
@@ -32,10 +34,11 @@ class CuboidTable {
 
   /// Cuboids of up to `largest` hypotheses per axis (at most 16 count). `masks` are of `map`. The values do not depend
   /// on the number of threads. Unusable after a cancellation.
-  /// `certificates` are of `map`, the goal and costs at most these; they bound what is left in small boxes.
+  /// `certificates` are of `map`, the goal and costs at most these; they bound what is left in small boxes. From the
+  /// store, or made and kept there; its key stands for all of these.
   CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
               const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs,
-              const CancellationToken* cancellation = nullptr);
+              const CancellationToken* cancellation = nullptr, const ArrayStore* store = nullptr);
 
   const Cell& largest() const { return largest_; }
   double unit() const { return unit_; }
@@ -49,7 +52,7 @@ class CuboidTable {
   struct Plane {
     Cell whole = Cell::Zero();   ///< cells of the grid
     Cell stored = Cell::Zero();  ///< of them up to the middle along mirrored axes
-    std::vector<std::uint32_t> values;
+    SharedArray<std::uint32_t> values;
   };
   struct Scratch;
   struct Source {
@@ -66,10 +69,14 @@ class CuboidTable {
   void FitIntoMemory(int orientations);
   void FillFlags(const ContactMap& map);
   void Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch);
+  /// All planes from smaller to larger cuboids; false after a cancellation.
+  bool FillAll(const ContactMap& map, const Source& source, Parallelism jobs, const CancellationToken* cancellation);
   /// Values where one step splits the cuboid; completes the flags (kBlockedSteps: nothing leads on from here).
-  void SplittingSteps(const Source& source, const Cell& size, int orientation, Plane& plane, Scratch& scratch) const;
+  void SplittingSteps(const Source& source, const Cell& size, int orientation, const Plane& plane,
+                      std::vector<std::uint32_t>& values, Scratch& scratch) const;
   /// Steps that show nothing, until nothing changes: values are settled by a few sweeps to and fro.
-  static void SilentSteps(std::uint32_t step_cost, Plane& plane, const std::vector<std::uint8_t>& flags);
+  static void SilentSteps(std::uint32_t step_cost, const Cell& stored, const std::vector<std::uint8_t>& flags,
+                          std::vector<std::uint32_t>& values);
   /// The best bound of a set of hypotheses (`layers`, emptied) over the partitions of it.
   std::uint64_t BestPartition(const Source& source, const std::vector<Bits256>& layers, const Cell& displacement,
                               int orientation, Scratch& scratch) const;

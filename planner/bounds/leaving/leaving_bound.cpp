@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstdlib>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "feeler/core/lattice_grid.h"
@@ -43,10 +44,10 @@ std::vector<double> Weigh(const std::vector<double>& bounds, const std::vector<d
 std::size_t Faces(const ContactMap& map, std::size_t most) {
   std::size_t faces = 0;
   for (int orientation = 0; orientation < map.orientations(); ++orientation) {
-    const ContactMap::Layer& layer = map.layer(orientation);
+    const ContactMap::LayerView& layer = map.layer(orientation);
     for (std::size_t i = 0; i < layer.blocked.size() && faces <= most; ++i) {
       if (layer.blocked[i] != 0) continue;
-      faces += std::ranges::any_of(layer.travel, [&](const std::vector<float>& travel) { return travel[i] < 1.0F; });
+      faces += std::ranges::any_of(layer.travel, [&](std::span<const float> travel) { return travel[i] < 1.0F; });
     }
   }
   return faces;

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <tuple>
 #include <utility>
 
@@ -27,7 +28,7 @@ std::array<Cell, 6> UnitNeighbours() {
 }  // namespace
 
 LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread, const Cell& longest,
-                     const std::vector<int>& orientations)
+                     const std::vector<int>& orientations, const ArrayStore* store)
     : place_(static_cast<std::size_t>(map.orientations()), -1) {
   for (std::size_t i = 0; i < orientations.size(); ++i)
     place_[static_cast<std::size_t>(orientations[i])] = static_cast<int>(i);
@@ -46,8 +47,12 @@ LineTable::LineTable(const ContactMap& map, const StepCosts& costs, const Cell& 
     grid.domain.max[axis] += grid.longest;
     grid.size = grid.domain.Size();
     grid.cells = static_cast<std::size_t>(grid.domain.Count());
-    grid.values.assign(grid.cells * static_cast<std::size_t>(grid.longest + 1) * orientations.size(), 0);
-    for (const int o : orientations) Fill(map, axis, o, spread[axis], {free_units, contact_units});
+    const std::string name = "lines " + std::to_string(axis);
+    if (store != nullptr && store->Take<std::uint16_t>(name, {&grid.values})) continue;
+    std::vector<std::uint16_t> values(grid.cells * static_cast<std::size_t>(grid.longest + 1) * orientations.size(), 0);
+    for (const int o : orientations) Fill(map, axis, o, spread[axis], {free_units, contact_units}, values);
+    grid.values = std::move(values);
+    if (store != nullptr) store->Keep<std::uint16_t>(name, {&grid.values});
   }
 }
 
@@ -136,12 +141,13 @@ void LineTable::SplittingSteps(const Grid& grid, const LineBits& bits, int axis,
   }
 }
 
-void LineTable::Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units) {
-  Grid& grid = grids_[static_cast<std::size_t>(axis)];
+void LineTable::Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units,
+                     std::vector<std::uint16_t>& values) const {
+  const Grid& grid = grids_[static_cast<std::size_t>(axis)];
   const std::array<std::int64_t, 3> strides = GridStrides(grid.size);
   const LineBits bits = BitsOf(map, grid, axis, orientation);
   const int place = place_[static_cast<std::size_t>(orientation)];
-  std::uint16_t* const planes = &grid.values[static_cast<std::size_t>(place * (grid.longest + 1)) * grid.cells];
+  std::uint16_t* const planes = &values[static_cast<std::size_t>(place * (grid.longest + 1)) * grid.cells];
   std::vector<std::uint32_t> cost(grid.cells);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> seeds;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> queue;

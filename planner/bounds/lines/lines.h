@@ -9,6 +9,8 @@
 
 #include "feeler/core/lattice.h"
 #include "feeler/core/lattice_grid.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/belief_heuristic.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/pair_certificates.h"
@@ -26,8 +28,9 @@ class LineTable {
   static constexpr std::uint16_t kUnreachable = 0xFFFF;
 
   /// Lines along axis i of up to `longest[i]` hypotheses (longer ones are cut; 1: none), for the orientations listed.
+  /// From the store, or made and kept there; its key stands for all of these.
   LineTable(const ContactMap& map, const StepCosts& costs, const Cell& spread, const Cell& longest,
-            const std::vector<int>& orientations);
+            const std::vector<int>& orientations, const ArrayStore* store = nullptr);
 
   double unit() const { return unit_; }
   /// In table units, times the length; `displacement` from the first (least) hypothesis of the line.
@@ -41,7 +44,7 @@ class LineTable {
   }
   std::size_t bytes() const {
     std::size_t bytes = 0;
-    for (const Grid& grid : grids_) bytes += grid.values.size() * sizeof(grid.values[0]);
+    for (const Grid& grid : grids_) bytes += grid.values.bytes();
     return bytes;
   }
   int longest(int axis) const { return grids_[static_cast<std::size_t>(axis)].longest; }
@@ -52,7 +55,7 @@ class LineTable {
     Cell size = Cell::Zero();
     std::size_t cells = 0;
     int longest = 1;
-    std::vector<std::uint16_t> values;
+    SharedArray<std::uint16_t> values;
     std::size_t Index(const Cell& displacement) const {
       return GridIndex(size, domain.Clamp(displacement) - domain.min);
     }
@@ -63,7 +66,8 @@ class LineTable {
     std::uint32_t contact;
   };
   struct LineBits;
-  void Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units);
+  void Fill(const ContactMap& map, int axis, int orientation, int spread, const StepUnits& units,
+            std::vector<std::uint16_t>& values) const;
   static LineBits BitsOf(const ContactMap& map, const Grid& grid, int axis, int orientation);
   /// The sum over the runs of a part of the line (`bits`) that is met at cell `at`.
   static std::uint32_t RunsValue(const Grid& grid, const std::uint16_t* planes, std::int64_t along, std::uint32_t bits,

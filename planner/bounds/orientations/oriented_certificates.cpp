@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include "feeler/core/worker_pool.h"
 #include "feeler/planner/belief/hull.h"
@@ -237,13 +239,14 @@ std::uint32_t OrientedBox::WayBack(const Cell& displacement) const {
 
 OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
                                            Parallelism jobs, const ProgressCallback& progress,
-                                           const CancellationToken* cancellation)
+                                           const CancellationToken* cancellation, const ArrayStore* store)
     : unit_(costs.free), layers_(static_cast<std::size_t>(flags.orientations())) {
   const Cell spread = problem.goal == GoalKind::kInsertable ? problem.insertable_spread : Cell(Cell::Zero());
   neighbours_ = NeighboursIn(problem, spread);
   std::vector<char> used(layers_.size(), 0);
   for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
   std::vector<int> orientations;
+  std::vector<SharedArray<std::uint8_t>*> values;
   const int rows = flags.orientations() / problem.pitches;
   for (int o = 0; o < flags.orientations(); ++o) {
     if (used[static_cast<std::size_t>(o)] == 0) continue;
@@ -267,11 +270,14 @@ OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFla
     }
     layer.lanes = 1 << bits;
     layer.box = OrientedBox(region, reach);
+    values.push_back(&layer.values);
   }
+  if (store != nullptr && store->Take("oriented certificates", values)) return;
   const int contact_units = static_cast<int>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)));
-  ParallelFor(
+  const bool all = ParallelFor(
       orientations.size(), jobs, [&](std::size_t k) { Fill(flags, orientations[k], contact_units); }, progress,
       cancellation);
+  if (all && store != nullptr) store->Keep("oriented certificates", values);
 }
 
 void OrientedCertificates::Fill(const StepFlagsGrid& flags, int orientation, int contact_units) {
@@ -297,15 +303,16 @@ void OrientedCertificates::Fill(const StepFlagsGrid& flags, int orientation, int
   sweeper.Run();
   const std::size_t cells = layer.box.cells;
   const auto lanes = static_cast<std::size_t>(layer.lanes);
-  layer.values.resize(cells * lanes);
+  std::vector<std::uint8_t> values(cells * lanes);
   constexpr std::size_t kBlock = 64;  // cells at a time, for the cache
   for (std::size_t begin = 0; begin < cells; begin += kBlock) {
     const std::size_t end = std::min(cells, begin + kBlock);
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      std::uint8_t* const plane = &layer.values[lane * cells];
+      std::uint8_t* const plane = &values[lane * cells];
       for (std::size_t cell = begin; cell < end; ++cell) plane[cell] = sweeper.At(cell, lane);
     }
   }
+  layer.values = std::move(values);
 }
 
 const std::uint8_t* OrientedCertificates::Plane(int orientation, unsigned subset) const {

@@ -8,6 +8,8 @@
 #include "feeler/core/lattice_grid.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/contact/step_flags_grid.h"
@@ -51,9 +53,11 @@ class OrientedCertificates {
   static constexpr std::uint8_t kNone = 255;  ///< some neighbour cannot be told apart
   static constexpr std::uint8_t kMost = 254;
 
-  /// For the orientations, goal and axes of the hypotheses of `problem`. Unusable after a cancellation.
+  /// For the orientations, goal and axes of the hypotheses of `problem`. Unusable after a cancellation. From the store,
+  /// or made and kept there; its key stands for all other arguments.
   OrientedCertificates(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs, Parallelism jobs,
-                       const ProgressCallback& progress, const CancellationToken* cancellation = nullptr);
+                       const ProgressCallback& progress, const CancellationToken* cancellation = nullptr,
+                       const ArrayStore* store = nullptr);
 
   const std::vector<OrientedNeighbour>& neighbours() const { return neighbours_; }
   /// Cost in problem units of a unit of the table.
@@ -78,7 +82,7 @@ class OrientedCertificates {
     int lanes = 0;
     std::array<int, kMostNeighbours> neighbour{};  ///< orientations, -1: none
     std::array<int, kMostNeighbours> lane_bit{};   ///< of a neighbour, -1: none
-    std::vector<std::uint8_t> values;              ///< plane after plane
+    SharedArray<std::uint8_t> values;              ///< plane after plane
   };
   void Fill(const StepFlagsGrid& flags, int orientation, int contact_units);
 

@@ -22,15 +22,20 @@ std::uint32_t NextIn(const OrientedBox& box, std::uint32_t from, Direction d) {
 }  // namespace
 
 OrientedLines::OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs,
-                             Parallelism jobs, const ProgressCallback& progress, const CancellationToken* cancellation)
+                             Parallelism jobs, const ProgressCallback& progress, const CancellationToken* cancellation,
+                             const ArrayStore* store)
     : units_per_step_(costs.contact > 0.0 ? kUnitsPerStep : 1) {
   std::vector<char> used(static_cast<std::size_t>(flags.orientations()), 0);
   for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
   for (const Axis axis : {kYaw, kPitch}) AddLines(axis, problem, flags, used);
+  std::vector<SharedArray<std::uint16_t>*> values;
+  for (Line& line : lines_) values.push_back(&line.values);
+  if (store != nullptr && store->Take("oriented lines", values)) return;
   const double contact = costs.contact / costs.free * units_per_step_;
   const auto contact_units = static_cast<std::uint32_t>(std::min(4000.0, std::floor(contact + 1e-9)));
-  ParallelFor(
+  const bool all = ParallelFor(
       lines_.size(), jobs, [&](std::size_t i) { Fill(flags, contact_units, lines_[i]); }, progress, cancellation);
+  if (all && store != nullptr) store->Keep("oriented lines", values);
 }
 
 void OrientedLines::AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags,
@@ -103,12 +108,13 @@ OrientedLines::LineBits OrientedLines::BitsOf(const StepFlagsGrid& flags, const 
   return bits;
 }
 
-void OrientedLines::SplittingSteps(const Line& line, const LineBits& bits, std::uint32_t subset,
-                                   std::uint32_t contact_units, std::vector<std::uint32_t>& cost,
+void OrientedLines::SplittingSteps(const OrientedBox& box, const std::vector<std::uint16_t>& values,
+                                   const LineBits& bits, std::uint32_t subset, std::uint32_t contact_units,
+                                   std::vector<std::uint32_t>& cost,
                                    std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds) const {
   const auto value = [&](std::uint32_t part, std::uint32_t at) -> std::uint32_t {
     if (std::has_single_bit(part)) return 0;
-    const std::uint16_t v = line.values[part * line.box.cells + at];
+    const std::uint16_t v = values[part * box.cells + at];
     return v == kNone ? kInfinite : v;
   };
   for (const std::uint32_t at : bits.telling) {
@@ -120,7 +126,7 @@ void OrientedLines::SplittingSteps(const Line& line, const LineBits& bits, std::
       const std::uint32_t after_hit = value(hit, at);
       // Over the edge everything repeats.
       const bool stays = (bits.leads[at] >> IndexOf(d) & 1) == 0;
-      const std::uint32_t after_miss = value(missed, stays ? at : NextIn(line.box, at, d));
+      const std::uint32_t after_miss = value(missed, stays ? at : NextIn(box, at, d));
       if (after_hit == kInfinite || after_miss == kInfinite) continue;
       const std::uint32_t of_split = after_hit + after_miss +
                                      static_cast<std::uint32_t>(std::popcount(hit)) * contact_units +
@@ -136,7 +142,7 @@ void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units
   const std::size_t cells = line.box.cells;
   const LineBits bits = BitsOf(flags, line);
   const std::uint32_t subsets = 1U << line.orientations.size();
-  line.values.assign(cells * subsets, 0);
+  std::vector<std::uint16_t> values(cells * subsets, 0);
   std::vector<std::uint32_t> order;
   for (std::uint32_t s = 1; s < subsets; ++s) {
     if (!std::has_single_bit(s)) order.push_back(s);
@@ -149,7 +155,7 @@ void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units
     const auto count = static_cast<std::uint32_t>(std::popcount(subset));
     std::ranges::fill(cost, kInfinite);
     seeds.clear();
-    SplittingSteps(line, bits, subset, contact_units, cost, seeds);
+    SplittingSteps(line.box, values, bits, subset, contact_units, cost, seeds);
     SpreadByEqualSteps(seeds, count * units_per_step_, cost, queue, [&](std::uint32_t to, auto relax) {
       for (const Direction d : kDirections) {
         if ((bits.leads[to] >> IndexOf(Opposite(d)) & 1) == 0) continue;
@@ -158,12 +164,13 @@ void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units
         relax(before);
       }
     });
-    std::uint16_t* const plane = &line.values[subset * cells];
+    std::uint16_t* const plane = &values[subset * cells];
     for (std::size_t i = 0; i < cells; ++i) {
       plane[i] =
           cost[i] == kInfinite ? kNone : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNone - 1U));
     }
   }
+  line.values = std::move(values);
 }
 
 const std::uint16_t* OrientedLines::Plane(int line, unsigned subset) const {

@@ -6,6 +6,8 @@
 
 #include "feeler/core/parallelism.h"
 #include "feeler/core/progress.h"
+#include "feeler/planner/arrays/array_store.h"
+#include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/orientations/oriented_certificates.h"
@@ -30,9 +32,11 @@ class OrientedLines {
     int bit = 0;    ///< of the orientation in subsets of its line
   };
 
-  /// For the orientations that the hypotheses of `problem` have. Unusable after a cancellation.
+  /// For the orientations that the hypotheses of `problem` have. Unusable after a cancellation. From the store, or made
+  /// and kept there; its key stands for all other arguments.
   OrientedLines(const Problem& problem, const StepFlagsGrid& flags, const StepCosts& costs, Parallelism jobs,
-                const ProgressCallback& progress, const CancellationToken* cancellation = nullptr);
+                const ProgressCallback& progress, const CancellationToken* cancellation = nullptr,
+                const ArrayStore* store = nullptr);
 
   /// Units of the tables per free step.
   std::uint32_t units_per_step() const { return units_per_step_; }
@@ -46,15 +50,15 @@ class OrientedLines {
   struct Line {
     std::vector<int> orientations;
     OrientedBox box;
-    std::vector<std::uint16_t> values;  ///< plane after plane, by subset
+    SharedArray<std::uint16_t> values;  ///< plane after plane, by subset
   };
   void AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags, const std::vector<char>& used);
   struct LineBits;
   static LineBits BitsOf(const StepFlagsGrid& flags, const Line& line);
   void Fill(const StepFlagsGrid& flags, std::uint32_t contact_units, Line& line) const;
   /// Lowers `cost` where one step splits the subset of the line, and lists these places.
-  void SplittingSteps(const Line& line, const LineBits& bits, std::uint32_t subset, std::uint32_t contact_units,
-                      std::vector<std::uint32_t>& cost,
+  void SplittingSteps(const OrientedBox& box, const std::vector<std::uint16_t>& values, const LineBits& bits,
+                      std::uint32_t subset, std::uint32_t contact_units, std::vector<std::uint32_t>& cost,
                       std::vector<std::pair<std::uint32_t, std::uint32_t>>& seeds) const;
 
   std::uint32_t units_per_step_ = 1;

@@ -2,27 +2,20 @@
 
 #define OMPI_SKIP_MPICXX 1
 #define MPICH_SKIP_MPICXX 1
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <mpi.h>
-#include <sys/file.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <deque>
 #include <exception>
-#include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -72,39 +65,6 @@ class Nap {
 
  private:
   microseconds length_ = kShortNap;
-};
-
-/// The first rank of a host to come has its turn alone, those after it together, once it is through or dead: nobody
-/// waits for a rank that failed on its way here. Where no such file can be had, all are the first.
-class HostTurn {
- public:
-  HostTurn(std::string file, const CancellationToken& cancellation) : file_(std::move(file)) {
-    descriptor_ = open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    Nap nap;
-    while (descriptor_ >= 0 && flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      if (errno != EWOULDBLOCK && errno != EINTR) break;
-      if (cancellation.cancelled()) {
-        close(descriptor_);
-        throw Interrupted();
-      }
-      std::this_thread::sleep_for(nap.Next());
-    }
-    struct stat status {};
-    first_ = descriptor_ >= 0 && fstat(descriptor_, &status) == 0 && status.st_size == 0;
-    if (descriptor_ >= 0 && !first_) flock(descriptor_, LOCK_UN);
-  }
-  ~HostTurn() {
-    if (descriptor_ < 0) return;
-    if (first_ && write(descriptor_, "1", 1) != 1) unlink(file_.c_str());
-    close(descriptor_);
-  }
-  HostTurn(const HostTurn&) = delete;
-  HostTurn& operator=(const HostTurn&) = delete;
-
- private:
-  std::string file_;
-  int descriptor_ = -1;
-  bool first_ = false;
 };
 
 /// What the greeting of a rank holds.
@@ -162,9 +122,6 @@ class MpiRanks final : public Ranks {
     }
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
-    job_ = static_cast<std::uint64_t>(steady_clock::now().time_since_epoch().count()) ^
-           static_cast<std::uint64_t>(getpid()) << 40;
-    MPI_Bcast(&job_, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
     accounts_.resize(static_cast<std::size_t>(size_));
     greetings_.resize(static_cast<std::size_t>(size_));
     for (int i = 0; i < size_; ++i) accounts_[static_cast<std::size_t>(i)].rank = i;
@@ -173,17 +130,11 @@ class MpiRanks final : public Ranks {
 
   ~MpiRanks() override {
     if (rank_ == 0) Dismiss();
-    unlink(TurnFile().c_str());
     MPI_Finalize();
   }
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-
-  void OncePerHost(const std::function<void()>& load) override {
-    const HostTurn turn(TurnFile(), cancellation_);
-    load();
-  }
 
   void Assemble(const std::string& identity) override {
     Nap nap;
@@ -287,13 +238,6 @@ class MpiRanks final : public Ranks {
   }
 
  private:
-  /// One name on all ranks of the job.
-  std::string TurnFile() const {
-    std::error_code error;
-    const auto folder = std::filesystem::temp_directory_path(error);
-    return (error ? std::filesystem::path("/tmp") : folder) / fmt::format("feeler-ranks-{:016x}", job_);
-  }
-
   bool SendAll() {
     std::deque<Message> out;
     {
@@ -411,8 +355,7 @@ class MpiRanks final : public Ranks {
   CancellationToken& cancellation_;
   int rank_ = 0;
   int size_ = 1;
-  std::uint64_t job_ = 0;  ///< a number of the job
-  MpiPost post_;           // the main thread's, and while it runs the pump's
+  MpiPost post_;  // the main thread's, and while it runs the pump's
   std::vector<Greeting> greetings_;
   std::vector<int> workers_;  ///< lane modulo their number -> rank
 

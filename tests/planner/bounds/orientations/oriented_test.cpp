@@ -122,7 +122,7 @@ TEST(Oriented, AnglesThatCannotBeFeltAreReported) {
   // A plug's map in two equal layers.
   const auto plug = testing::MakePlugMap(false, {4, 3, 3});
   const auto map = std::make_shared<ContactMap>(
-      plug->domain(), std::vector<ContactMap::Layer>{plug->layer(0), plug->layer(0)}, plug->phase(), 0.5);
+      plug->domain(), std::vector<ContactMap::Layer>{plug->CopyOfLayer(0), plug->CopyOfLayer(0)}, plug->phase(), 0.5);
   Task task = testing::MakePlugTask();
   task.axes.push_back({AxisKind::kYaw, 0.05, 2, 2});
   const Problem problem = MakeCuboidProblem(task, map, {2, 1, 1, 2, 1});
