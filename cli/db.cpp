@@ -16,6 +16,7 @@
 #include "feeler/cli/policy_output.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/execution/contact/executor_options.h"
@@ -108,7 +109,7 @@ void Info(const Flags& flags) {
       json["worst_predicted_force_n"] = force->second;
     }
     json["cost_unit"] = workflow::CostUnit(identity);
-    json["settings"] = nlohmann::json::parse(identity.settings);
+    json["settings"] = ParseJsonText<nlohmann::json>(identity.settings);
     json["created_by"] = identity.created_by;
     if (identity.shard) {
       json["shard"] = {{"index", identity.shard->index},

@@ -37,14 +37,17 @@ std::string ExecuteProgram() {
   if (length > 0) {
     const auto beside = std::filesystem::path(std::string(own.data(), static_cast<std::size_t>(length))).parent_path() /
                         "feeler-execute";
-    if (std::filesystem::exists(beside)) return beside;
+    std::error_code error;
+    if (std::filesystem::exists(beside, error)) return beside;
   }
   return "feeler-execute";
 }
 
 /// Databases of older versions have no bundle beside them: it is made where the task is given.
 void EnsureBundle(const Flags& flags) {
-  if (flags.task.empty() || flags.db.empty() || std::filesystem::exists(policies::BundlePathOf(flags.db))) return;
+  std::error_code error;
+  if (flags.task.empty() || flags.db.empty()) return;
+  if (std::filesystem::exists(policies::BundlePathOf(flags.db), error)) return;
   policies::Database database = policies::Database::OpenReadOnly(flags.db);
   const workflow::PlanningSetup setup =
       workflow::LoadPlanningSetup(flags.task, workflow::SetupOptionsOf(database.identity()));

@@ -18,6 +18,7 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/model/task_file.h"
@@ -63,7 +64,7 @@ void Perceive(const Flags& flags) {
     for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
   }
   const workflow::TargetFinder finder(model);
-  const perception::Registration found = Locate(flags.sources, finder, table);
+  const perception::Registration found = Locate(flags.sources, finder, table, task.world_T_target.translation());
   if (!found.found)
     throw NegativeResult(flags.sources.depth + flags.sources.cloud, "target not found: " + found.reason);
 
@@ -157,8 +158,9 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
   }
   const std::string report = workflow::ReportJson(calibration, options);
   WriteFileAtomically(flags.out, perception::ToJson(calibration.table, report));
+  workflow::RemovePartial(options);
   if (flags.json) {
-    nlohmann::json json = nlohmann::json::parse(report);
+    nlohmann::json json = ParseJsonText<nlohmann::json>(report);
     if (session.ranks != nullptr) json["ranks"] = RanksJson(session, std::ssize(calibration.samples));
     PrintJson(json);
     return;
@@ -167,6 +169,7 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
       "task {}: {} poses and {} installations for the table, as many others to judge it; {} "
       "targets not found\n",
       model.task.name, flags.poses, flags.installations, calibration.not_found);
+  text += workflow::NegativesLine(calibration.negatives);
   text += ErrorLine("95 % of errors below", workflow::SummarizeErrors(calibration, false));
   text += ErrorLine("the same without bias", workflow::SummarizeErrors(calibration, true));
   text += CoverageLine("truth within hypotheses, held out", calibration.held_out);

@@ -43,7 +43,7 @@ void RequireSources(const std::string& task, const TargetSources& sources) {
 }
 
 perception::Registration Locate(const TargetSources& sources, const workflow::TargetFinder& finder,
-                                const perception::UncertaintyTable& table) {
+                                const perception::UncertaintyTable& table, const Eigen::Vector3d& expected_m) {
   std::optional<perception::CameraIntrinsics> camera;
   if (!sources.intrinsics.empty()) {
     camera = perception::ParseIntrinsics(perception::ReadFile(sources.intrinsics), sources.intrinsics);
@@ -51,17 +51,20 @@ perception::Registration Locate(const TargetSources& sources, const workflow::Ta
   if (!sources.cloud.empty()) {
     std::vector<std::string> notes;
     perception::Points points = perception::ReadCloud(sources.cloud, &notes);
-    for (const std::string& note : notes) fmt::print(stderr, "{}\n", note);
+    for (const std::string& note : notes) Note("{}\n", note);
     if (!camera) return finder.InCloud(points, table.camera_m);
     for (Eigen::Vector3d& p : points) p = camera->world_T_camera * p;
     return finder.InCloud(points, camera->world_T_camera.translation());
   }
   const perception::DepthFrame depth =
       perception::ParseDepthPng(perception::ReadFile(sources.depth), *camera, sources.depth);
-  if (sources.background.empty()) return finder.InDepth(depth, *camera);
-  const perception::DepthFrame background =
-      perception::ParseDepthPng(perception::ReadFile(sources.background), *camera, sources.background);
-  return finder.InDepth(depth, *camera, &background);
+  std::optional<perception::DepthFrame> background;
+  if (!sources.background.empty()) {
+    background = perception::ParseDepthPng(perception::ReadFile(sources.background), *camera, sources.background);
+  }
+  perception::Registration found = finder.InDepth(depth, *camera, background ? &*background : nullptr);
+  if (!found.found) found.reason += perception::GuessDepthUnit(depth, *camera, expected_m);
+  return found;
 }
 
 PerceivedTarget FindTarget(const std::string& task, const std::string& db, const TargetSources& sources) {
@@ -76,7 +79,7 @@ PerceivedTarget FindTarget(const std::string& task, const std::string& db, const
     for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
   }
   const workflow::TargetFinder finder(model);
-  const perception::Registration found = Locate(sources, finder, table);
+  const perception::Registration found = Locate(sources, finder, table, model.task.world_T_target.translation());
   if (!found.found) throw NegativeResult(sources.depth + sources.cloud, "target not found: " + found.reason);
   const perception::PoseHypotheses hypotheses = perception::HypothesesFor(table, found.world_T_target);
   const auto extents = workflow::SnapTo(family, model.task, hypotheses.counts);

@@ -20,9 +20,10 @@ void AddTargetSources(CLI::App& command, TargetSources& sources);
 
 /// Throws InputError for sources that do not go together.
 void RequireSources(const std::string& task, const TargetSources& sources);
-/// Looks for the target in them. Throws InputError for files that cannot be read.
+/// Looks for the target in them; `expected_m`: where the task has it. Where it is not found in a depth image that may
+/// be in another unit, the reason says so. Throws InputError for files that cannot be read.
 perception::Registration Locate(const TargetSources& sources, const workflow::TargetFinder& finder,
-                                const perception::UncertaintyTable& table);
+                                const perception::UncertaintyTable& table, const Eigen::Vector3d& expected_m);
 
 /// As options of feeler execute.
 struct PerceivedTarget {

@@ -151,13 +151,12 @@ void PomdpFlags::AddTo(CLI::App& command) {
       ->description(
           "rtdp-bel, e-rtdp-bel or certified; with --pomdp also point-based, the default there for discounts below 1");
   command.add_option("--pomdp", pomdp, "general POMDP: .pomdp (Cassandra's format) or .pomdpx (APPL's), docs/pomdp.md");
-  command.add_option("--precision", precision, "with --pomdp: stop when value_upper - value_lower is at most this")
-      ->capture_default_str();
-  command.add_option("--levels", levels, "with --pomdp: levels of RTDP-Bel's discretisation of beliefs; 0: none")
-      ->capture_default_str();
-  command
-      .add_option("--simulate", simulate, "with --pomdp: episodes of RTDP-Bel's greedy policy to simulate afterwards")
-      ->capture_default_str();
+  AddReal(command, "--precision", precision, 0.0, 1e9,
+          "with --pomdp: stop when value_upper - value_lower is at most this");
+  AddInteger(command, "--levels", levels, 0, 1000000,
+             "with --pomdp: levels of RTDP-Bel's discretisation of beliefs; 0: none");
+  AddInteger(command, "--simulate", simulate, 0, 100000000,
+             "with --pomdp: episodes of RTDP-Bel's greedy policy to simulate afterwards");
   command.add_option("--experience", experience,
                      "with --pomdp and e-rtdp-bel: policy (.json) of a similar problem with the same actions and "
                      "observations");
@@ -231,10 +230,8 @@ void AddPolicySimulateCommand(CLI::App& policy, Session& session) {
                    "what feeler solve --pomdp --out wrote: .json (graph), .alpha or .policyx")
       ->required();
   AddInteger(*command, "--episodes", flags->episodes, 1, 100000000, "how many");
-  command
-      ->add_option("--max-steps", flags->max_steps,
-                   "steps of an episode at most (0: until a goal, or until the discount leaves a millionth)")
-      ->capture_default_str();
+  AddInteger(*command, "--max-steps", flags->max_steps, 0, 1000000000,
+             "steps of an episode at most (0: until a goal, or until the discount leaves a millionth)");
   AddSeed(*command, flags->seed, "of the episodes");
   command->add_flag("--json", flags->json, "print the result as JSON");
   command->callback([flags, &session] { RunSimulate(*flags, session); });

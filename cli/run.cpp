@@ -23,6 +23,7 @@
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/core/interrupted.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/env/scene/scene.h"
@@ -220,7 +221,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   const double force_budget_n =
       workflow::ForceBudget(setup->task(), workflow::ParseFaults(flags.noise), options.force_budget_n);
   if (!options.force_budget_n && force_budget_n > setup->task().force_budget_n) {
-    fmt::print(stderr, "force budget: {:g} N, as the noise of the force sensor asks for\n", force_budget_n);
+    Note("force budget: {:g} N, as the noise of the force sensor asks for\n", force_budget_n);
   }
   options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
@@ -251,7 +252,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   int solved_online = 0;  // though a database was to answer
   ProgressBar bar(WithRanks("episodes", session));
   const auto on_record = [&](std::size_t index, const std::string& line) {
-    const auto record = nlohmann::json::parse(line);
+    const auto record = ParseJsonText<nlohmann::json>(line);
     rows.push_back(evaluation::SummaryRow(record));
     bands.Add(record);
     if (flags.policy == "database" && rows.back().policy != flags.policy) ++solved_online;

@@ -28,4 +28,12 @@ constexpr bool IsNestedDeeper(std::string_view text, int levels = kMostJsonLevel
   return false;
 }
 
+/// The one way to read a JSON text of any origin, where `Json` is nlohmann's: null-like "discarded" for what is no
+/// JSON or nested too deep. Never throws on the text's account.
+template <class Json>
+Json ParseJsonText(std::string_view text, int levels = kMostJsonLevels) {
+  if (IsNestedDeeper(text, levels)) return Json(Json::value_t::discarded);
+  return Json::parse(text.begin(), text.end(), nullptr, false);
+}
+
 }  // namespace feeler

@@ -118,6 +118,7 @@ ExperimentOutcome RunExperiment(const Experiment& experiment, const ExperimentRe
   std::error_code error;
   std::filesystem::create_directories(request.out, error);
   if (error) throw InputError(request.out, "cannot be created: " + error.message(), "choose another folder");
+  RequireOwnCsv(request.out, experiment.name);
   ExperimentResult result = experiment.run(request);
   ExperimentOutcome outcome{result.complete, PartialFile(request, experiment.name), result.text};
   if (!result.complete) return outcome;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 
 #include "feeler/core/captured_stderr.h"
 #include "feeler/core/error.h"
@@ -71,7 +72,58 @@ PngHeader CheckPng(std::string_view bytes, const std::string& where) {
   return header;
 }
 
+struct DepthUnit {
+  double scale_m;
+  const char* name;
+};
+constexpr std::array<DepthUnit, 7> kDepthUnits{{{1e-3, "0.001 (millimetres)"},
+                                                {2e-4, "0.0002 (5000 a metre, as the data sets of TUM)"},
+                                                {2.5e-4, "0.00025 (quarters of a millimetre, as RealSense L515)"},
+                                                {1.25e-4, "0.000125 (eighths of a millimetre)"},
+                                                {1e-4, "0.0001 (tenths of a millimetre)"},
+                                                {1e-2, "0.01 (centimetres)"},
+                                                {1e-5, "0.00001 (hundredths of a millimetre)"}}};
+
+/// The units that would put `seen_m` near `expected_m`, best first.
+std::string FittingUnits(double seen_m, double expected_m, double depth_scale_m) {
+  constexpr double kNear = 1.4;
+  std::vector<std::pair<double, const char*>> fitting;
+  for (const DepthUnit& unit : kDepthUnits) {
+    const double off = std::abs(std::log(seen_m / depth_scale_m * unit.scale_m / expected_m));
+    if (off < std::log(kNear)) fitting.emplace_back(off, unit.name);
+  }
+  std::sort(fitting.begin(), fitting.end());
+  std::string names;
+  for (const auto& [off, name] : fitting) names += (names.empty() ? "" : " or ") + std::string(name);
+  return names;
+}
+
 }  // namespace
+
+std::string GuessDepthUnit(const DepthFrame& frame, const CameraIntrinsics& camera, const Eigen::Vector3d& expected_m) {
+  constexpr double kRight = 1.8;  // between target and bench, or where the target may be
+  const Eigen::Vector3d p = camera.world_T_camera.inverse() * expected_m;
+  if (!(p.z() > 0.0)) return "";
+  const double column = camera.fx * p.x() / p.z() + camera.cx;
+  const double row = camera.fy * p.y() / p.z() + camera.cy;
+  const int half = std::max(2, camera.width / 16);
+  std::vector<float> depths;
+  for (int v = 0; v < frame.height; ++v) {
+    for (int u = 0; u < frame.width; ++u) {
+      if (std::abs(u - column) > half || std::abs(v - row) > half) continue;
+      const float depth = frame.depth_m[static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width) +
+                                        static_cast<std::size_t>(u)];
+      if (depth > 0.0F) depths.push_back(depth);
+    }
+  }
+  if (depths.empty()) return "";
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  if (std::abs(std::log(*middle / p.z())) < std::log(kRight)) return "";
+  const std::string units = FittingUnits(*middle, p.z(), camera.depth_scale_m);
+  return fmt::format("; the picture is {:.3g} m deep where the target is expected at {:.3g} m: depth_scale_m {:g} {}",
+                     *middle, p.z(), camera.depth_scale_m, units.empty() ? "may be wrong" : "may have to be " + units);
+}
 
 DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera, const std::string& where) {
   const PngHeader header = CheckPng(bytes, where);
@@ -114,8 +166,11 @@ DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera,
     }
   }
   if (farthest > 0.0F && (farthest < 0.02F || nearest > 50.0F)) {
-    throw InputError(where, fmt::format("depths from {:.4g} to {:.4g} m", nearest, farthest),
-                     "set depth_scale_m of the intrinsics to the metres per unit");
+    constexpr double kUsual_m = 1.0;
+    const std::string units = FittingUnits(std::sqrt(nearest * farthest), kUsual_m, camera.depth_scale_m);
+    throw InputError(
+        where, fmt::format("depths from {:.4g} to {:.4g} m", nearest, farthest),
+        "set depth_scale_m of the intrinsics to the metres per unit" + (units.empty() ? "" : ": it may be " + units));
   }
   return frame;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -31,6 +32,12 @@ struct DepthFrame {
 /// Reads the JSON of a camera (docs/file-formats.md). `where` stands for the file in messages. Throws InputError.
 CameraIntrinsics ParseIntrinsics(std::string_view json, const std::string& where);
 std::string ToJson(const CameraIntrinsics& camera);
+
+/// Where a picture may be in another unit than its intrinsics say: at the pixels around `expected_m` (world), where
+/// something is expected, it sees much farther or nearer than that. Names the units in use by cameras and data sets
+/// that would fit (millimetres, 0.25 mm, TUM's 5000 per metre, ...), as the end of a sentence; empty where the unit
+/// may be right.
+std::string GuessDepthUnit(const DepthFrame& frame, const CameraIntrinsics& camera, const Eigen::Vector3d& expected_m);
 
 /// Decodes a 16-bit grey PNG; a pixel is a depth in units of `camera.depth_scale_m`, 0: no reading.
 /// Throws InputError for what is not such an image, is damaged, or has another size than the camera; and for depths

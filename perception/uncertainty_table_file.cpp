@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/perception/input_file.h"
 #include "feeler/perception/uncertainty_table.h"
 
@@ -89,7 +90,7 @@ std::string ToJson(const UncertaintyTable& table, const std::string& report_json
   json["averaged_frames"] = table.averaged_frames;
   json["rules"] = RulesJson(table.rules);
   json["plain_rules"] = RulesJson(table.plain_rules);
-  if (!report_json.empty()) json["report"] = nlohmann::ordered_json::parse(report_json);
+  if (!report_json.empty()) json["report"] = ParseJsonText<nlohmann::ordered_json>(report_json);
   return json.dump(2) + "\n";
 }
 

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <numbers>
 #include <system_error>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 
 namespace feeler::cad {
 namespace {
@@ -222,42 +224,64 @@ std::string StlBytes(const TriangleMesh& mesh) {
   return bytes;
 }
 
-void WriteWhole(const fs::path& file, const std::string& bytes) {
-  const fs::path temporary = file.string() + ".part";
-  std::ofstream out(temporary, std::ios::binary);
-  out << bytes;
-  out.close();
+namespace {
+
+/// A file that an import writes, by its name.
+bool IsImportName(const std::string& name) {
+  if (name == "task.xml" || name == "import.json" || name == "report.html") return true;
+  return name.ends_with(".stl") &&
+         (name.starts_with("tool_") || name.starts_with("target_") || name.starts_with("lid_"));
+}
+
+}  // namespace
+
+void RequireImportFolder(const fs::path& folder, const std::vector<std::string>& inputs) {
   std::error_code error;
-  if (out) fs::rename(temporary, file, error);
-  if (!out || error) {
-    fs::remove(temporary, error);
-    throw InputError(file.string(), "cannot be written", "is the folder writable, and has the disk room?");
+  std::string known;
+  if (fs::is_regular_file(folder / "import.json", error)) {
+    std::ifstream in(folder / "import.json", std::ios::binary);
+    known.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  const bool ours = known.find("\"format\": \"feeler-import\"") != std::string::npos;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string path = it->path().string();
+    if (!IsImportName(it->path().filename().string())) continue;
+    for (const std::string& input : inputs) {
+      if (IsSameFile(path, input)) {
+        throw InputError("--out", path + " would be replaced, and is the input " + input, "choose another folder");
+      }
+    }
+    if (!ours) {
+      throw InputError("--out", path + " is there, and no earlier import wrote it: it is not overwritten",
+                       "choose another folder, or move it away");
+    }
   }
 }
 
 void WriteTaskFolder(const TaskContent& content, const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (!fs::is_directory(folder)) throw InputError(folder.string(), "cannot be made", "give another --out");
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    const bool ours = name.ends_with(".stl") &&
-                      (name.starts_with("tool_") || name.starts_with("target_") || name.starts_with("lid_"));
-    if (ours) fs::remove(entry.path(), error);
+  if (!fs::is_directory(folder, error)) throw InputError(folder.string(), "cannot be made", "give another --out");
+  std::vector<fs::path> before;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (name.ends_with(".stl") && IsImportName(name)) before.push_back(it->path());
   }
+  for (const fs::path& mesh : before) fs::remove(mesh, error);
   const auto write_pieces = [&](const std::string& kind, const std::vector<ConvexPiece>& pieces) {
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-      if (!IsAlignedBox(pieces[i])) WriteWhole(folder / (PieceName(kind, i) + ".stl"), StlBytes(pieces[i].surface));
+      if (!IsAlignedBox(pieces[i]))
+        WriteFileAtomically((folder / (PieceName(kind, i) + ".stl")).string(), StlBytes(pieces[i].surface));
     }
   };
   write_pieces("tool", content.tool);
   write_pieces("target", content.target);
   write_pieces("lid", content.lids);
   if (content.tool_surface.size() <= kMostDrawn)
-    WriteWhole(folder / "tool_surface.stl", StlBytes(content.tool_surface));
+    WriteFileAtomically((folder / "tool_surface.stl").string(), StlBytes(content.tool_surface));
   if (content.target_surface.size() <= kMostDrawn)
-    WriteWhole(folder / "target_surface.stl", StlBytes(content.target_surface));
-  WriteWhole(folder / "task.xml", TaskXml(content));
+    WriteFileAtomically((folder / "target_surface.stl").string(), StlBytes(content.target_surface));
+  WriteFileAtomically((folder / "task.xml").string(), TaskXml(content));
 }
 
 }  // namespace feeler::cad

@@ -41,7 +41,8 @@ void WriteTaskFolder(const TaskContent& content, const std::filesystem::path& fo
 /// Binary STL of a surface.
 std::string StlBytes(const TriangleMesh& mesh);
 
-/// Writes a file under a temporary name first: it is complete or not there. Throws InputError.
-void WriteWhole(const std::filesystem::path& file, const std::string& bytes);
+/// Throws InputError if an import into `folder` would replace or remove a file of `inputs` (by device and inode), or
+/// files that no earlier import wrote (its import.json says so).
+void RequireImportFolder(const std::filesystem::path& folder, const std::vector<std::string>& inputs);
 
 }  // namespace feeler::cad

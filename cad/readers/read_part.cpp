@@ -48,8 +48,9 @@ std::int64_t CountLines(const fs::path& file, std::string_view keyword) {
 
 /// A binary STL is as long as its count says; many begin with "solid" all the same.
 std::optional<std::int64_t> BinaryStlTriangles(const fs::path& file) {
-  const auto size = static_cast<std::int64_t>(fs::file_size(file));
-  if (size < 84) return std::nullopt;
+  std::error_code error;
+  const auto size = static_cast<std::int64_t>(fs::file_size(file, error));
+  if (error || size < 84) return std::nullopt;
   std::ifstream in(file, std::ios::binary);
   in.seekg(80);
   std::array<unsigned char, 4> bytes{};
@@ -67,8 +68,9 @@ void RequireModest(const fs::path& file, const std::string& extension) {
   } else if (extension == ".obj") {
     triangles = CountLines(file, "f");
   } else {
-    triangles = static_cast<std::int64_t>(fs::file_size(file)) / 12;  // three indices of four bytes at the least
-    if (triangles < 40 * kMostTriangles) return;
+    std::error_code error;
+    triangles = static_cast<std::int64_t>(fs::file_size(file, error)) / 12;  // three indices of four bytes at the least
+    if (error || triangles < 40 * kMostTriangles) return;
   }
   if (triangles > kMostTriangles) TooMany(file, triangles);
 }

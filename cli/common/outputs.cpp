@@ -49,7 +49,7 @@ struct Kind {
 };
 
 /// By what our own writers begin with; the order is that of FileKind.
-constexpr std::array<Kind, 16> kKinds{{
+constexpr std::array<Kind, 17> kKinds{{
     {"a policy file",
      [](std::string_view h) {
        return h.starts_with('{') && HoldsAll(h, {"\"task\"", "\"start\"", "\"expected_cost\""});
@@ -88,6 +88,8 @@ constexpr std::array<Kind, 16> kKinds{{
        return alpha || HoldsAll(h, {"<Policy"}) || (h.starts_with('{') && HoldsAll(h, {"\"nodes\""}));
      }},
     {"a cell file", [](std::string_view h) { return h.starts_with('{') && HoldsAll(h, {"\"feeler cell\""}); }},
+    {"a part of pipes",
+     [](std::string_view h) { return h.starts_with("<mujoco") && HoldsAll(h, {"make-pipe-parts"}); }},
 }};
 
 InputError CannotWrite(const Output& output, int error) {

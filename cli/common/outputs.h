@@ -22,7 +22,8 @@ enum class FileKind {
   kManifest,
   kScene,
   kPomdpPolicy,  ///< .json, .alpha or .policyx
-  kCell
+  kCell,
+  kPipePart
 };
 
 struct Output {

@@ -294,6 +294,7 @@ void Executing::Judge(const EpisodeReply& told, ExecutedEpisode& episode) {
   line.world_T_true = verdict.world_T_true;
   line.truth_outside = verdict.truth_outside;
   line.fault_values = verdict.fault_values;
+  line.contact_parameters = verdict.contact_parameters;
   line.localized = false;
   if (episode.execution.world_T_estimate) {
     line.error = execution::PoseErrorOf(bundle_.task, verdict.world_T_true, *episode.execution.world_T_estimate);

@@ -22,6 +22,7 @@
 #include "feeler/core/file_output.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/env/contact/axis_visibility.h"
+#include "feeler/env/model/contact_settings.h"
 #include "feeler/env/scene/scene.h"
 #include "feeler/env/vision/image.h"
 #include "feeler/env/vision/renderer.h"
@@ -78,7 +79,12 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
                     {"pairs", axis.pairs}});
   }
   const Cell size = map.domain().Size();
+  const env::TaskModel& model = setup.model;
+  auto feel =
+      env::ContactParameters(*model.model, model.tool_geoms, model.target_geoms, model.tool_body, model.target_body);
+  feel.erase("digest");  // of the physics of an episode: it stands in the records
   return {{"task", task.name},
+          {"contact_parameters", feel},
           {"file", setup.model.file.string()},
           {"fingerprint", setup.fingerprint},
           {"axes", axes},
@@ -141,6 +147,17 @@ void PrintTask(const workflow::PlanningSetup& setup) {
         task.tolerance.vertical_m * 1000, task.tolerance.angle_rad * 180 / std::numbers::pi);
   Print("cost           {} per cell, {} per contact, {} per action; goal {}\n", task.cost.per_cell,
         task.cost.per_contact, task.cost.per_action, ToString(task.goal));
+  const env::TaskModel& model = setup.model;
+  const auto feel =
+      env::ContactParameters(*model.model, model.tool_geoms, model.target_geoms, model.tool_body, model.target_body);
+  const auto range = [&](const std::string& name) {
+    const double least = feel.at(name + "_least");
+    const double most = feel.at(name + "_most");
+    return least == most ? fmt::format("{:g}", least) : fmt::format("{:g}..{:g}", least, most);
+  };
+  Print("contact        friction {}, solref {} {}, solimp {} {}; tool {:.3g} kg, target {:.3g} kg\n", range("friction"),
+        range("solref_0"), range("solref_1"), range("solimp_0"), range("solimp_1"), feel.at("tool_mass_kg"),
+        feel.at("target_mass_kg"));
   Print("move lengths   {}\n", fmt::join(task.move_lengths, ", "));
   const Cell size = map.domain().Size();
   Print("contact map    {} x {} x {} displacements of {:.4g} mm, {} orientation{}, opening {}, {:.1f} % blocked\n",
@@ -193,10 +210,14 @@ void MakePipeParts(const cad::PipeParameters& parameters, const std::string& fol
   if (!std::filesystem::is_directory(folder, error)) {
     throw InputError("--out", "\"" + folder + "\" is not a folder", "make it first");
   }
-  for (const cad::PartFile& part : cad::GeneratePipeParts(parameters)) {
-    const std::string path = (std::filesystem::path(folder) / part.name).string();
-    WriteFileAtomically(path, part.text);
-    Print("{}\n", path);
+  const std::vector<cad::PartFile> parts = cad::GeneratePipeParts(parameters);
+  const auto path_of = [&](const cad::PartFile& part) { return (std::filesystem::path(folder) / part.name).string(); };
+  std::vector<Output> outputs;
+  for (const cad::PartFile& part : parts) outputs.push_back({"--out", path_of(part), FileKind::kPipePart});
+  RequireOutputs(outputs, {});
+  for (const cad::PartFile& part : parts) {
+    WriteFileAtomically(path_of(part), part.text);
+    Print("{}\n", path_of(part));
   }
 }
 
@@ -229,8 +250,8 @@ void AddTaskCommand(CLI::App& app, Session& session) {
   render->add_option("task", flags->task, "name, or path of a task file")->required();
   render->add_option("--view", flags->view, "overview, close-up, section (cut open) or mouth (into the opening)")
       ->capture_default_str();
-  render->add_option("--depth", flags->depth_mm, "section: of the tool below the mouth, mm; negative: above it")
-      ->capture_default_str();
+  AddReal(*render, "--depth", flags->depth_mm, -1000.0, 1000.0,
+          "section: of the tool below the mouth, mm; negative: above it");
   render->add_flag("--no-lids", flags->no_lids, "section, mouth: without what closes the opening while localizing");
   render->add_option("--out", flags->out, "PNG file to write")->required();
   render->callback([flags] { Render(*flags); });

@@ -17,6 +17,7 @@
 #include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 #include "feeler/evaluation/cad_import/import_report.h"
 #include "feeler/evaluation/cad_import/import_task.h"
 #include "feeler/evaluation/cad_import/trial.h"
@@ -192,7 +193,7 @@ void Import(const Flags& flags, Session& session) {
     trial = evaluation::RunTrial(task, trial_options);
     bar.Finish();
   }
-  cad::WriteWhole(options.out / "report.html", evaluation::ImportReport(task, trial));
+  WriteFileAtomically((options.out / "report.html").string(), evaluation::ImportReport(task, trial));
   const std::string verdict = evaluation::Verdict(task, trial);
   if (flags.json) {
     nlohmann::json json = task.json;
@@ -248,10 +249,8 @@ void AddTaskImport(CLI::App& task, Session& session) {
       ->capture_default_str();
   command->add_option("--set", flags->set,
                       "FIELD=VALUE of the task file, instead of what would be derived; may be given several times");
-  command
-      ->add_option("--deviation", flags->deviation,
-                   "largest deviation of the pieces where the parts mate, as a share of the clearance")
-      ->capture_default_str();
+  AddReal(*command, "--deviation", flags->deviation, 0.0, 1.0,
+          "largest deviation of the pieces where the parts mate, as a share of the clearance");
   command->add_flag("--no-trial", flags->no_trial, "do not solve and run episodes");
   AddInteger(*command, "--episodes", flags->episodes, 1, 1000000, "of each kind in the trial");
   AddJobs(*command, flags->jobs, "threads of the trial");

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "feeler/core/error.h"
 
@@ -137,6 +140,46 @@ void RequireSaneContactParameters(const mjModel& model, const std::string& where
     }
     if (!(solimp[2] >= 0)) refuse(fmt::format("the width {} of solimp is negative", solimp[2]), "0.0005 is common");
   }
+}
+
+std::map<std::string, double> ContactParameters(const mjModel& model, const std::vector<int>& tool_geoms,
+                                                const std::vector<int>& target_geoms, int tool_body, int target_body) {
+  std::map<std::string, double> parameters;
+  std::uint32_t digest = 2166136261U;  // FNV-1a
+  const auto add = [&](const mjtNum* values, int count) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(values);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count) * sizeof(mjtNum); ++i) {
+      digest = (digest ^ bytes[i]) * 16777619U;
+    }
+  };
+  const auto range = [&](const std::string& name, double value) {
+    const auto [least, is_new] = parameters.emplace(name + "_least", value);
+    const auto most = parameters.emplace(name + "_most", value).first;
+    least->second = std::min(least->second, value);
+    most->second = std::max(most->second, value);
+  };
+  for (const std::vector<int>* geoms : {&tool_geoms, &target_geoms}) {
+    for (const int geom : *geoms) {
+      range("friction", model.geom_friction[3 * geom]);
+      range("solref_0", model.geom_solref[mjNREF * geom]);
+      range("solref_1", model.geom_solref[mjNREF * geom + 1]);
+      range("solimp_0", model.geom_solimp[mjNIMP * geom]);
+      range("solimp_1", model.geom_solimp[mjNIMP * geom + 1]);
+      add(model.geom_friction + 3 * geom, 3);
+      add(model.geom_solref + mjNREF * geom, mjNREF);
+      add(model.geom_solimp + mjNIMP * geom, mjNIMP);
+      const mjtNum others[] = {static_cast<mjtNum>(model.geom_condim[geom]),
+                               static_cast<mjtNum>(model.geom_priority[geom]), model.geom_solmix[geom]};
+      add(others, 3);
+    }
+  }
+  for (const auto& [name, body] : {std::pair{"tool_mass_kg", tool_body}, {"target_mass_kg", target_body}}) {
+    parameters[name] = model.body_mass[body];
+    add(model.body_mass + body, 1);
+    add(model.body_inertia + 3 * body, 3);
+  }
+  parameters["digest"] = digest;
+  return parameters;
 }
 
 void RequireNoError(const TaskFindings& findings) {

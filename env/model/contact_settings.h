@@ -1,5 +1,9 @@
 #pragma once
 
+#include <map>
+#include <string>
+#include <vector>
+
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/model/task_finding.h"
 
@@ -10,6 +14,12 @@ namespace feeler::env {
 /// exclusions that concern tool or target, equality constraints. A task that plans and moves the same has none.
 /// `where` names the file.
 TaskFindings ContactSettingFindings(const TaskModel& task_model, const std::string& where);
+
+/// How contact between tool and target feels, without moving where it is: friction, solref and solimp of their geoms
+/// (least and most where they differ), masses of both, and a digest (32 bits) of all that physics takes from these
+/// geoms and bodies. Two models of equal digest feel alike.
+std::map<std::string, double> ContactParameters(const mjModel& model, const std::vector<int>& tool_geoms,
+                                                const std::vector<int>& target_geoms, int tool_body, int target_body);
 
 /// Contact parameters that no simulation means: friction below zero, time constants or stiffness of mixed sign,
 /// impedances outside of 0 to 1. Throws InputError naming the geom.

@@ -16,6 +16,8 @@
 #include "feeler/cad/readers/read_part.h"
 #include "feeler/cad/step/read_step.h"
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/env/model/task_xml.h"
 #include "feeler/evaluation/cad_import/import_json.h"
 
@@ -181,11 +183,20 @@ void KeepOverrides(const fs::path& folder, std::map<std::string, std::string>& o
   const fs::path file = folder / "import.json";
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return;
-  const auto json = nlohmann::json::parse(env::ReadTextFile(file), nullptr, false);
+  const auto json = ParseJsonText<nlohmann::json>(env::ReadTextFile(file));
   if (!json.is_object() || !json.contains("overrides") || !json["overrides"].is_object()) return;
   for (const auto& [field, value] : json["overrides"].items()) {
     if (value.is_string()) overrides.try_emplace(field, value.get<std::string>());
   }
+}
+
+/// So that an import that is killed leaves a folder which the next one knows as its own.
+void MarkFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder, error)) throw InputError(folder.string(), "cannot be made", "give another --out");
+  if (fs::exists(folder / "import.json", error)) return;
+  WriteFileAtomically((folder / "import.json").string(), nlohmann::json{{"format", "feeler-import"}}.dump(2) + "\n");
 }
 
 void RequireClearanceKept(const ImportOptions& options, ImportedTask& task, const env::TaskModel& model) {
@@ -248,6 +259,8 @@ void Describe(const ImportOptions& options, const cad::Alignment& alignment, Imp
 
 ImportedTask ImportTask(const ImportOptions& given) {
   ImportOptions options = given;
+  cad::RequireImportFolder(
+      options.out, {cad::ParseSource(options.tool).file.string(), cad::ParseSource(options.target).file.string()});
   KeepOverrides(options.out, options.overrides);
   const cad::Material material = cad::ParseMaterial(options.material);
   ImportedTask task;
@@ -280,6 +293,7 @@ ImportedTask ImportTask(const ImportOptions& given) {
   // First with a cell that is as good as any: the walls it is chosen by are found on the pieces as MuJoCo has them.
   content.numbers = cad::DeriveNumbers(task.mating, task.tool.placed, task.target.placed, {}, numbers);
   task.task_file = options.out / "task.xml";
+  MarkFolder(options.out);
   cad::WriteTaskFolder(content, options.out);
   task.walls = cad::WallsOf(env::LoadTask(task.task_file.string()));
   content.numbers = cad::DeriveNumbers(task.mating, task.tool.placed, task.target.placed, task.walls, numbers);
@@ -289,7 +303,7 @@ ImportedTask ImportTask(const ImportOptions& given) {
   FindFlush(task);
   Describe(options, alignment, task);
   task.json = ImportJson(options, task);
-  cad::WriteWhole(options.out / "import.json", task.json.dump(2) + "\n");
+  WriteFileAtomically((options.out / "import.json").string(), task.json.dump(2) + "\n");
   return task;
 }
 

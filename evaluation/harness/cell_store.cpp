@@ -31,6 +31,10 @@ CellStore::~CellStore() {
 
 std::size_t CellStore::Read(const std::string& path, const json& settings, Cells& cells) {
   const std::string other = "choose another folder, or move this file away";
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    throw InputError(path, "is not there", "give the folder that feeler experiment --out wrote");
+  }
   std::string text;
   {
     std::ifstream in(path, std::ios::binary);
@@ -44,7 +48,7 @@ std::size_t CellStore::Read(const std::string& path, const json& settings, Cells
     if (end == std::string::npos) break;  // cut off while it was written
     ++number;
     const std::string_view bytes = std::string_view(text).substr(begin, end - begin);
-    const json line = IsNestedDeeper(bytes) ? json() : json::parse(bytes, nullptr, false);
+    const auto line = ParseJsonText<json>(bytes);
     const bool header = number == 1;
     const bool valid =
         line.is_object() && (header ? line.contains("settings")

@@ -43,7 +43,7 @@ std::vector<json> ReadFinished(const std::string& path, const EpisodeSetting& se
     const std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) break;
     const std::string_view bytes = std::string_view(text).substr(begin, end - begin);
-    json record = IsNestedDeeper(bytes) ? json() : json::parse(bytes, nullptr, false);
+    auto record = ParseJsonText<json>(bytes);
     const auto is = [&](const char* key, const json& value) { return record.contains(key) && record[key] == value; };
     const bool expected = records.size() < numbers.size();
     if (!record.is_object() || !expected || !is("episode", numbers[records.size()]) || !is("seed", seed) ||
@@ -69,7 +69,7 @@ std::map<std::int64_t, json> ReadShards(const std::vector<std::string>& files, c
     int number = 0;
     for (std::string line; std::getline(in, line) && !in.eof();) {  // a last line that is cut off is none
       ++number;
-      json record = IsNestedDeeper(line) ? json() : json::parse(line, nullptr, false);
+      auto record = ParseJsonText<json>(line);
       const bool good = record.is_object() && record.value("seed", json()) == json(seed) &&
                         record.value("noise", json()) == json(workflow::ParseFaults(setting.noise).name) &&
                         record.value("episode", json()).is_number_integer();

@@ -3,13 +3,16 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/version.h"
 
 namespace feeler::evaluation {
@@ -67,10 +70,39 @@ nlohmann::json ToJson(const Figure& figure) {
   return document;
 }
 
-std::string ToCsv(const ResultTable& table) {
+namespace {
+
+std::string HeaderOf(const std::vector<std::string>& columns) {
   std::string csv;
-  for (std::size_t i = 0; i < table.columns.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(table.columns[i]);
-  csv += "\n";
+  for (std::size_t i = 0; i < columns.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(columns[i]);
+  return csv;
+}
+
+std::string Slurp(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+void RequireOwnCsv(const std::string& folder, const std::string& name) {
+  const std::string path = folder + "/" + name + ".csv";
+  std::ifstream in(path, std::ios::binary);
+  std::string first;
+  if (!in || !std::getline(in, first)) return;
+  const auto document = ParseJsonText<nlohmann::json>(Slurp(folder + "/" + name + ".json"));
+  const nlohmann::json columns = document.is_object() ? document.value("columns", nlohmann::json()) : nlohmann::json();
+  const auto is_text = [](const nlohmann::json& column) { return column.is_string(); };
+  if (columns.is_array() && std::all_of(columns.begin(), columns.end(), is_text) &&
+      HeaderOf(columns.get<std::vector<std::string>>()) == first) {
+    return;
+  }
+  throw InputError(path, "exists and is not the table of experiment " + name + ": it is not overwritten",
+                   "choose another folder, or move this file away");
+}
+
+std::string ToCsv(const ResultTable& table) {
+  std::string csv = HeaderOf(table.columns) + "\n";
   for (const auto& row : table.rows) {
     for (std::size_t i = 0; i < row.size(); ++i) csv += (i == 0 ? "" : ",") + CsvCell(row[i]);
     csv += "\n";
@@ -88,6 +120,7 @@ void WriteExperiment(const std::string& folder, const std::string& name, const R
           "give one cell a column");
     }
   }
+  RequireOwnCsv(folder, name);
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be created: " + error.message(), "choose another folder");

@@ -46,6 +46,10 @@ struct Figure {
 /// `{"title", "x_label", "y_label", "x_log", "y_log", "series": [{"name", "points": [{"x", "y", "low", "high"}]}]}`
 nlohmann::json ToJson(const Figure& figure);
 
+/// An existing NAME.csv in `folder` is replaced only if it is the table of the NAME.json beside it, which an experiment
+/// wrote: its first line names the same columns. Throws InputError otherwise.
+void RequireOwnCsv(const std::string& folder, const std::string& name);
+
 /// Writes NAME.csv (the table), NAME.json (table, details and figures) and manifest.json into `folder`, created if
 /// missing; each file is replaced whole or not at all. Throws InputError if the folder cannot be written or a row has a
 /// wrong length.

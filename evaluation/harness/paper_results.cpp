@@ -1,9 +1,11 @@
 #include "feeler/evaluation/harness/paper_results.h"
 
 #include <fstream>
+#include <iterator>
 
 #include "feeler/core/data_folder.h"
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 
 namespace feeler::evaluation {
 namespace {
@@ -20,7 +22,7 @@ const nlohmann::json& PaperResults() {
   static const nlohmann::json kResults = [] {
     const std::string file = FindData("evaluation/paper_results.json").string();
     std::ifstream in(file);
-    nlohmann::json document = nlohmann::json::parse(in, nullptr, false);
+    auto document = ParseJsonText<nlohmann::json>(std::string{std::istreambuf_iterator<char>(in), {}});
     if (!document.is_object()) {
       throw InputError(file, "damaged", "restore it from the source of feeler");
     }

@@ -17,6 +17,7 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
   line.policy = record.policy;
   line.noise = record.noise;
   line.fault_values = record.fault_values;
+  line.contact_parameters = record.contact_parameters;
   line.seed = record.seed;
   line.episode = record.episode;
   line.placement = record.placement;
@@ -97,12 +98,15 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
     ++number;
     if (line.empty()) continue;
     try {
-      if (IsNestedDeeper(line))
-        throw InputError(fmt::format("{} line {}", path, number), "is nested too deep", "run the episode again");
-      rows.push_back(SummaryRow(nlohmann::json::parse(line)));
+      const auto record = ParseJsonText<nlohmann::json>(line);
+      if (record.is_discarded()) {
+        throw InputError(fmt::format("{} line {}", path, number), "is no JSON, or nested too deep",
+                         "run the episode again");
+      }
+      rows.push_back(SummaryRow(record));
     } catch (const nlohmann::json::exception& e) {
       throw InputError(path + " line " + std::to_string(number), std::string("not an episode record: ") + e.what(),
-                       "remove the line");
+                       "run the episode again");
     }
   }
   return rows;

@@ -28,7 +28,7 @@ void ReadLines(const File& file, std::map<std::int64_t, std::string>& lines) {
   std::size_t present = 0;
   for (std::string line; std::getline(in, line);) {
     const std::string where = fmt::format("{} line {}", file.path, present + 1);
-    const nlohmann::json record = IsNestedDeeper(line) ? nlohmann::json() : nlohmann::json::parse(line, nullptr, false);
+    const auto record = ParseJsonText<nlohmann::json>(line);
     if (in.eof() || !record.is_object() || !record.contains("episode") || !record["episode"].is_number_integer()) {
       throw InputError(where, "is no episode record", "run the shard again");
     }
@@ -111,8 +111,7 @@ RecordsShard ReadRecordsShard(const std::string& records) {
     throw InputError(records, "is no shard: " + path + " is missing", "make it with feeler run --shard I/N --out");
   try {
     const std::string text{std::istreambuf_iterator<char>(in), {}};
-    if (IsNestedDeeper(text)) throw InputError(path, "is nested too deep", "run the shard again");
-    const nlohmann::json said = nlohmann::json::parse(text);
+    const auto said = ParseJsonText<nlohmann::json>(text);
     RecordsShard shard;
     shard.shard = {said.at("shard").at("index").get<int>(), said.at("shard").at("count").get<int>()};
     shard.episodes = said.at("episodes").get<std::int64_t>();
@@ -128,8 +127,8 @@ RecordsShard ReadRecordsShard(const std::string& records) {
 std::vector<EpisodeSummaryRow> MergeRecords(const std::vector<std::string>& paths, const std::string& out) {
   if (paths.size() < 2) throw InputError("records merge", "one file is nothing to merge", "give all shards of a run");
   struct stat status {};
-  if (stat(out.c_str(), &status) == 0 && S_ISREG(status.st_mode)) {
-    throw InputError(out, "exists already: it is not overwritten", "give another name, or delete it");
+  if (IsReplaceable(out) && stat(out.c_str(), &status) == 0 && status.st_size > 0) {
+    throw InputError(out, "exists already: it is not overwritten", "give another name");
   }
   std::vector<File> files;
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -145,7 +144,7 @@ std::vector<EpisodeSummaryRow> MergeRecords(const std::vector<std::string>& path
   OutputFile output(out);
   for (const auto& [episode, line] : lines) {
     try {
-      rows.push_back(SummaryRow(nlohmann::json::parse(line)));
+      rows.push_back(SummaryRow(ParseJsonText<nlohmann::json>(line)));
     } catch (const nlohmann::json::exception& e) {
       throw InputError(fmt::format("episode {}", episode), std::string("is no record: ") + e.what(),
                        "run its shard again");

@@ -132,7 +132,7 @@ std::string ReplayLine(const json& record) {
 
 ReportedEpisode ReadRecordLine(const std::string& line, json& record) {
   if (IsNestedDeeper(line)) Refuse("is nested too deep");
-  record = json::parse(line, nullptr, false);
+  record = ParseJsonText<json>(line);
   if (record.is_discarded()) Refuse("is cut off, or no JSON");
   if (!record.is_object()) Refuse("is no JSON object");
   for (const char* key : {"task", "policy", "noise"}) Text(record, key);

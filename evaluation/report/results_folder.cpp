@@ -26,9 +26,7 @@ std::string Slurp(const fs::path& path) {
 }
 
 /// Discarded if it is no JSON, or nested deeper than anything of ours.
-json Parse(const std::string& text) {
-  return IsNestedDeeper(text) ? json(json::value_t::discarded) : json::parse(text, nullptr, false);
-}
+json Parse(const std::string& text) { return ParseJsonText<json>(text); }
 
 class FolderReader {
  public:

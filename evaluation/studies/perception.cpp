@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "feeler/core/json_depth.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/evaluation/records/statistics.h"
 #include "feeler/evaluation/studies/perception_pictures.h"
@@ -102,10 +103,11 @@ ExperimentResult RunPerception(const ExperimentRequest& request) {
   for (const workflow::CalibrationSample& sample : calibration.samples) cpu_s.push_back(sample.cpu_s);
   result.text += fmt::format("95 % of errors; registration {:.0f} ms of CPU (median), {:.0f} ms (95 %); {} not found\n",
                              1e3 * Median(cpu_s), 1e3 * Quantile(cpu_s, 0.95), calibration.not_found);
-  result.details = {{"report", nlohmann::json::parse(workflow::ReportJson(calibration, options))},
+  result.details = {{"report", ParseJsonText<nlohmann::json>(workflow::ReportJson(calibration, options))},
                     {"registration_cpu_s", {{"median", Median(cpu_s)}, {"p95", Quantile(cpu_s, 0.95)}}},
                     {"pictures", DrawPerception(task_model, calibration, options, request.out)}};
   result.complete = true;
+  workflow::RemovePartial(options);
   return result;
 }
 

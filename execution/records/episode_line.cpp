@@ -86,6 +86,7 @@ ordered_json ToJson(const EpisodeLine& line, const ExecutionRecord& execution) {
   json["policy"] = line.policy;
   json["noise"] = line.noise;
   if (!line.fault_values.empty()) json["fault_values"] = line.fault_values;
+  if (!line.contact_parameters.empty()) json["contact_parameters"] = line.contact_parameters;
   json["seed"] = line.seed;
   json["episode"] = line.episode;
   json["placement"] = line.placement;

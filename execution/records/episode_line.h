@@ -27,7 +27,8 @@ struct EpisodeLine {
   std::string task;
   std::string policy;
   std::string noise;
-  std::map<std::string, double> fault_values;  ///< what faults with ranges came to, in their units
+  std::map<std::string, double> fault_values;        ///< what faults with ranges came to, in their units
+  std::map<std::string, double> contact_parameters;  ///< how contact feels in this simulation; empty: not known
   std::uint64_t seed = 0;
   std::uint64_t episode = 0;
   std::string placement;

@@ -19,7 +19,7 @@ std::string ReadTokenFile(const std::string& path) {
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0 && S_ISREG(status.st_mode)) {
     throw InputError(path, "others may read the token", "chmod 600 it");
   }
-  std::getline(in, token);
+  for (char c = 0; token.size() <= kMost && in.get(c) && c != '\n';) token += c;  // a device may never end a line
   const bool printable = std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
   if (token.empty() || token.size() > kMost || !printable) {
     throw InputError(path, "its first line is no token", "write 1 to 200 letters and digits, without blanks");

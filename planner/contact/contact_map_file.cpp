@@ -81,7 +81,7 @@ class MapReader {
   }
   std::size_t left() const { return bytes_.size() - at_; }
   [[noreturn]] void Fail(const std::string& what) const {
-    throw InputError(where_, "the contact map " + what, "delete the file and build it anew");
+    throw InputError(where_, "the contact map " + what, "move the file away: it is built anew");
   }
 
  private:

@@ -162,7 +162,7 @@ void CopyBundle(const std::vector<std::string>& parts, const std::string& out) {
   for (const std::string& part : parts) {
     std::ifstream in(BundlePathOf(part), std::ios::binary);
     if (!in) continue;
-    WriteFileAtomically(BundlePathOf(out), std::string(std::istreambuf_iterator<char>(in), {}));
+    WriteBundleFile(BundlePathOf(out), std::string(std::istreambuf_iterator<char>(in), {}));
     return;
   }
 }
@@ -173,7 +173,7 @@ MergeSummary MergeDatabases(const std::vector<std::string>& paths, const std::st
                             const ProgressCallback& progress, const CancellationToken* cancellation) {
   struct stat status {};
   if (stat(out.c_str(), &status) == 0) {
-    throw InputError(out, "exists already: it is not overwritten", "give another name, or delete it");
+    throw InputError(out, "exists already: it is not overwritten", "give another name");
   }
   const std::vector<Part> parts = OpenParts(paths);
   std::int64_t total = 0;

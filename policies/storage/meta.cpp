@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "feeler/core/error.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/policies/io/bytes.h"
 #include "feeler/policies/storage/file_checks.h"
 #include "feeler/policies/storage/hash.h"
@@ -91,7 +92,7 @@ std::string AxesText(const std::vector<AxisKind>& axes) {
 }
 
 Meta ToMeta(const DatabaseIdentity& identity) {
-  const json settings = json::parse(identity.settings, nullptr, false);
+  const auto settings = ParseJsonText<json>(identity.settings);
   if (!settings.is_object()) throw std::invalid_argument("DatabaseIdentity: settings is not a JSON object");
   return {{"task", identity.task},
           {"fingerprint", identity.fingerprint},
@@ -104,14 +105,15 @@ Meta ToMeta(const DatabaseIdentity& identity) {
 
 DatabaseIdentity FromMeta(const Meta& meta, const std::string& path) {
   try {
-    const json cost = json::parse(meta.at("cost"));
+    const auto cost = ParseJsonText<json>(meta.at("cost"));
+    if (!ParseJsonText<json>(meta.at("settings")).is_object()) throw std::invalid_argument("settings");
     DatabaseIdentity identity{meta.at("task"), meta.at("fingerprint"), meta.at("opening"),   meta.at("goal"),
                               CostFrom(cost),  meta.at("settings"),    meta.at("created_by")};
     const auto axes = meta.find(kMetaAxes);
     if (axes != meta.end()) identity.axes = ParseAxes(axes->second, path);
     const auto shard = meta.find(kMetaShard);
     if (shard != meta.end()) {
-      const json part = json::parse(shard->second);
+      const auto part = ParseJsonText<json>(shard->second);
       identity.shard = {part.at("index"), part.at("count"), part.at("problems"), part.at("family"), part.at("digest")};
     }
     return identity;
@@ -129,7 +131,7 @@ void RequireSameIdentity(const Meta& stored, const DatabaseIdentity& identity, c
     if (have == want) continue;
     if (std::string_view(key) == "fingerprint") {
       throw InputError(path, "was made for another geometry of task " + identity.task + " (its fingerprint differs)",
-                       "write to another file, or delete this one");
+                       "write to another file");
     }
     throw InputError(path, fmt::format("was made with another {} ({}, not {})", key, have, want),
                      "use the same settings to continue it, or write to another file");

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/planner/contact/contact_map_file.h"
 #include "feeler/planner/contact/exact_travel.h"
 #include "feeler/policies/io/bytes.h"
@@ -199,12 +201,24 @@ void WriteBundle(const std::string& path, const TaskBundle& bundle) {
   bytes += content.bytes();
   ByteWriter checksum;
   checksum.Fixed64(Hash64(bytes));
-  WriteFileAtomically(path, bytes + checksum.bytes());
+  WriteBundleFile(path, bytes + checksum.bytes());
+}
+
+void WriteBundleFile(const std::string& path, std::string_view bytes) {
+  std::ifstream in(path, std::ios::binary);
+  std::string head(kBundleMagic.size(), '\0');
+  if (in && in.read(head.data(), 1) &&
+      !(in.read(head.data() + 1, static_cast<std::streamsize>(head.size()) - 1) && head == kBundleMagic)) {
+    throw InputError(path, "exists and is not the bundle of a task: it is not overwritten",
+                     "move it away, or choose another name for the database");
+  }
+  WriteFileAtomically(path, bytes);
 }
 
 TaskBundle ReadBundle(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) FailBundle(path, "the bundle of the task is not there");
+  std::error_code ignored;
+  if (!in || !std::filesystem::is_regular_file(path, ignored)) FailBundle(path, "the bundle of the task is not there");
   const std::string bytes{std::istreambuf_iterator<char>(in), {}};
   constexpr std::size_t kHead = kBundleMagic.size() + 4;
   const std::string_view all = bytes;
@@ -226,7 +240,7 @@ TaskBundle ReadBundle(const std::string& path) {
   };
   TaskBundle bundle;
   try {
-    const json head = json::parse(text());
+    const auto head = ParseJsonText<json>(text());
     bundle.fingerprint = head.at("fingerprint").get<std::string>();
     bundle.opening = head.at("opening").get<std::string>();
     bundle.task = TaskFrom(head.at("task"));

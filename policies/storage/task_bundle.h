@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "feeler/core/task.h"
@@ -33,6 +34,8 @@ std::string BundlePathOf(const std::string& database);
 
 /// Replaces the file whole or not at all (layout: docs/file-formats.md). Throws InputError if it cannot be written.
 void WriteBundle(const std::string& path, const TaskBundle& bundle);
+/// The bytes of one. Throws InputError, too, for a file that exists and is no bundle: it is not overwritten.
+void WriteBundleFile(const std::string& path, std::string_view bytes);
 /// Throws InputError when the file is missing, of a newer version or damaged.
 TaskBundle ReadBundle(const std::string& path);
 /// The bundle beside `database`. Throws InputError as well when it was made for another task or opening.

@@ -49,6 +49,12 @@ std::vector<NumericOption> Options() {
           {{"report", "/tmp", "--out", "/tmp/none.html"}, "--replay-megabytes", "1e9"},
           {{"policy", "graph", "--policy", "x", "--problem", kProblem}, "--max-depth", "-1"},
           {{"policy", "graph", "--policy", "x", "--problem", kProblem}, "--min-probability", "2"},
+          {{"task", "render", "plug", "--out", "/tmp/none.png"}, "--depth", "1e999"},
+          {{"task", "import", "--tool", "a.stl", "--target", "b.stl", "--out", "/tmp/none"}, "--deviation", "1.5"},
+          {{"solve", "--pomdp", "none.pomdp"}, "--precision", "-1"},
+          {{"solve", "--pomdp", "none.pomdp"}, "--levels", "99999999999"},
+          {{"solve", "--pomdp", "none.pomdp"}, "--simulate", "99999999999"},
+          {{"policy", "simulate", "--pomdp", "none.pomdp", "--policy", "none.json"}, "--max-steps", "-1"},
           {{"task", "make-pipe-parts", "--out", "/tmp"}, "--chamfer", "1e300"}};
 }
 

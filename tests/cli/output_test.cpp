@@ -134,6 +134,58 @@ TEST(Output, AFileOfAnotherKindIsKept) {
   EXPECT_EQ(RunFeeler({"solve", "--problem", kProblem, "--out", notes}).exit_code, 0) << "its own kind is replaced";
 }
 
+TEST(Output, WhatABundleACalibrationOrAFolderWouldReplaceIsKept) {
+  const std::string folder = ScratchFolder("beside");
+  const std::string text = "what I must not lose\n";
+  const auto expect_kept = [&](const std::string& file, const std::vector<std::string>& command) {
+    WriteFile(folder + "/" + file, text);
+    const CommandResult result = RunFeeler(command);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_NE(result.err.find(file + ": exists and"), std::string::npos) << result.err;
+    EXPECT_TRUE(result.err.ends_with(")\n")) << result.err;
+    EXPECT_EQ(ReadFile(folder + "/" + file), text) << file;
+  };
+  expect_kept("x.db.bundle", {"preprocess", "--task", "plug", "--family", "2x2x2", "--out", folder + "/x.db"});
+  expect_kept("t.json.partial.jsonl", {"perceive", "calibrate", "--task", "plug", "--out", folder + "/t.json"});
+  expect_kept("bounds.csv", {"experiment", "bounds", "--quick", "--out", folder});
+  WriteFile(folder + "/pipe_geoms.xml", text);
+  ExpectRefused(RunFeeler({"task", "make-pipe-parts", "--out", folder}), "pipe_geoms.xml");
+  EXPECT_EQ(ReadFile(folder + "/pipe_geoms.xml"), text);
+  EXPECT_FALSE(fs::exists(folder + "/pipe_assets.xml")) << "nothing is written before all is known to be replaceable";
+}
+
+TEST(Output, AnImportReplacesWhatAnImportWroteAlone) {
+  const std::string folder = ScratchFolder("import");
+  const std::string part = folder + "/tool_of_mine.stl";
+  const std::string facets = "solid a\nendsolid a\n";
+  WriteFile(part, facets);
+  const auto import = [&](const std::string& tool) {
+    return RunFeeler({"task", "import", "--tool", tool, "--target", tool, "--out", folder});
+  };
+  ExpectRefused(import(part), "is the input");
+  WriteFile(folder + "/import.json", "{\"format\": \"feeler-import\"}");
+  ExpectRefused(import(part), "is the input");
+  fs::remove(folder + "/import.json");
+  const std::string elsewhere = ScratchFolder("parts") + "/a.stl";
+  WriteFile(elsewhere, facets);
+  ExpectRefused(import(elsewhere), "no earlier import wrote it");
+  EXPECT_EQ(ReadFile(part), facets);
+}
+
+TEST(Output, ShardsAreMergedIntoWhatIsWritten) {
+  const std::string folder = ScratchFolder("merge");
+  for (const char* shard : {"1/2", "2/2"}) {
+    ASSERT_EQ(RunFeeler({"run", "--task", "plug", "--policy", "open-loop", "--extents", "2x2x2", "--episodes", "2",
+                         "--shard", shard, "--out", folder + "/" + shard[0]})
+                  .exit_code,
+              0);
+  }
+  const CommandResult result =
+      RunFeeler({"records", "merge", folder + "/1", folder + "/2", "--out", "/dev/stdout", "--json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("\"episode\":1"), std::string::npos) << result.out;
+}
+
 TEST(Output, LeftoversOfAKilledRunGo) {
   const std::string folder = ScratchFolder("leftovers");
   WriteFile(folder + "/p.json.part", "half of someth");

@@ -155,6 +155,13 @@ TEST_F(Perceive, SaysWhatIsWrong) {
   ExpectRefused({"--depth", File("depth.png")}, 2, "--intrinsics");
 }
 
+TEST_F(Perceive, ShardsThatHaveNoEndAreRefused) {
+  const CommandResult result =
+      RunFeeler({"perceive", "calibrate", "--task", "plug", "--out", File("t.json"), "--from", "/dev/zero"});
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("/dev/zero: cannot be read as a file"), std::string::npos) << result.err;
+}
+
 TEST_F(Perceive, NothingThereIsTheAnswerNo) {
   std::vector<Eigen::Vector3d> post;
   for (int i = 0; i < 4000; ++i) post.emplace_back(0.5 + 0.02 * std::cos(i), 0.02 * std::sin(i), 0.05 + 1e-4 * i);
@@ -163,6 +170,25 @@ TEST_F(Perceive, NothingThereIsTheAnswerNo) {
   const perception::CameraIntrinsics camera = Camera();
   WriteFile(File("dark.png"), DepthPng({}, camera));
   ExpectRefused({"--depth", File("dark.png"), "--intrinsics", File("camera.json")}, 1, "no points");
+}
+
+TEST_F(Perceive, ADepthImageInAnotherUnitIsGuessed) {
+  // Units a metre of the picture, read with intrinsics that say millimetres; what the message names.
+  const std::pair<double, const char*> units[] = {{5000, "0.0002 (5000 a metre"},
+                                                  {4000, "0.00025 (quarters"},
+                                                  {10000, "0.0001 (tenths"},
+                                                  {100, "0.01 (centimetres)"}};
+  for (const auto& [per_metre, named] : units) {
+    perception::CameraIntrinsics camera = Camera();
+    camera.depth_scale_m = 1.0 / per_metre;
+    WriteFile(File("depth.png"), DepthPng(Scene(), camera));
+    ExpectRefused({"--depth", File("depth.png"), "--intrinsics", File("camera.json")}, 1, named);
+  }
+  perception::CameraIntrinsics fine = Camera();
+  fine.depth_scale_m = 1e-5;
+  WriteFile(File("camera.json"), ToJson(fine));
+  WriteFile(File("depth.png"), DepthPng(Scene(), Camera()));
+  ExpectRefused({"--depth", File("depth.png"), "--intrinsics", File("camera.json")}, 2, "0.001 (millimetres)");
 }
 
 TEST_F(Perceive, TablesOfOtherTasksAndVersionsAreRefused) {

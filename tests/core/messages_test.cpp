@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -118,11 +120,81 @@ TEST(Messages, EveryInputErrorSaysHowToMend) {
         EXPECT_TRUE(arguments.size() == 3 && arguments[2] != "\"\"")
             << entry.path() << ": InputError(" << arguments[0] << ", " << arguments[1];
         if (arguments.size() != 3) continue;
-        EXPECT_EQ(arguments[2].find("deleteit"), std::string::npos) << entry.path() << ": advice that loses data";
+        EXPECT_EQ(arguments[2].find("delete "), std::string::npos) << entry.path() << ": advice that loses data";
       }
     }
   }
   EXPECT_GT(found, 300);
+}
+
+TEST(FileSystem, NoCallThrows) {
+  // What the system refuses (EACCES, ENAMETOOLONG, ELOOP ...) is a message of ours: every call takes an error_code, or
+  // asks a status that was got with one.
+  const std::vector<std::string> calls = {"exists",
+                                          "is_directory",
+                                          "is_regular_file",
+                                          "file_size",
+                                          "remove",
+                                          "remove_all",
+                                          "create_directories",
+                                          "create_directory",
+                                          "rename",
+                                          "absolute",
+                                          "canonical",
+                                          "weakly_canonical",
+                                          "resize_file",
+                                          "copy_file",
+                                          "status",
+                                          "symlink_status",
+                                          "read_symlink",
+                                          "current_path",
+                                          "temp_directory_path"};
+  int found = 0;
+  for (const std::string room :
+       {"core", "planner", "policies", "execution", "env", "cad", "perception", "workflow", "evaluation", "cli"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(FEELER_SOURCE_DIR) / room)) {
+      if (!entry.is_regular_file()) continue;
+      std::ifstream in(entry.path());
+      const std::string text{std::istreambuf_iterator<char>(in), {}};
+      for (const std::string& name : calls) {
+        for (const std::string space : {"fs::", "filesystem::"}) {
+          const std::string call = space + name + "(";
+          for (std::size_t at = text.find(call); at != std::string::npos; at = text.find(call, at + 1)) {
+            ++found;
+            const std::string last = Arguments(text, at + call.size()).back();
+            const bool asked = last == "error" || last == "ignored" || last == "ec" || last == "status" ||
+                               last.starts_with("fs::symlink_status(") || last.starts_with("fs::status(");
+            EXPECT_TRUE(asked) << entry.path() << ": " << call << "... " << last;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 50);
+}
+
+TEST(JsonDepth, EveryTextIsReadByAReaderThatLimitsIt) {
+  // The helper; the two readers that name keys and limit depth while they read; a text of our own in the program.
+  const std::set<std::string> readers = {"core/json_depth.h", "policies/io/json_input.cpp", "perception/input_file.cpp",
+                                         "execution/remote/protocol/schema.cpp"};
+  for (const std::string room : {"core", "planner", "policies", "execution", "env", "cad", "perception", "workflow",
+                                 "evaluation", "cli", "python/src"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(fs::path(FEELER_SOURCE_DIR) / room)) {
+      const std::string name = fs::relative(entry.path(), FEELER_SOURCE_DIR).string();
+      if (!entry.is_regular_file() || readers.contains(name)) continue;
+      std::ifstream in(entry.path());
+      const std::string text{std::istreambuf_iterator<char>(in), {}};
+      for (const char* call : {"json::parse(", "json::accept(", "json::sax_parse("}) {
+        EXPECT_EQ(text.find(call), std::string::npos) << name << " reads JSON of any depth; use ParseJsonText";
+      }
+    }
+  }
+}
+
+TEST(JsonDepth, WhatIsTooDeepIsDiscarded) {
+  EXPECT_TRUE(ParseJsonText<nlohmann::json>(std::string(100000, '[')).is_discarded());
+  EXPECT_TRUE(ParseJsonText<nlohmann::json>("{\"a\": [1, ").is_discarded());
+  EXPECT_EQ(ParseJsonText<nlohmann::json>("{\"a\": [1]}").at("a").size(), 1U);
 }
 
 }  // namespace

@@ -1,15 +1,25 @@
-// fuzz_readers: mutated inputs over the readers of this process; resumable.
-//   fuzz_readers [--runs N a reader] [--seed S] [--reader NAME] [--state FILE]
-// Input k of a reader is drawn from (seed, k, its name): a number found once is found again. The state file keeps how
-// far each reader is; a reader that crashes leaves the number of the input in it, and the next call begins behind it.
-// Built with the preset `fuzz`, the readers run under the address and undefined-behaviour sanitizers.
-// The last line is a JSON object: runs, refused, unexpected, crashes, cpu_s.
+// fuzz_readers: mutated inputs over all readers, in a process of their own each; resumable.
+//   fuzz_readers [--runs N in all] [--seed S] [--reader NAME] [--state FILE]
+// The runs are shared out evenly. Input k of a reader is drawn from (seed, k, its name): a number found once is found
+// again. A reader that crashes, hangs for kHang_s or ends the process is started again behind that input; the state
+// file keeps how far each is. What crashes in another library's reader is counted apart (`third_party_crashes`). Built
+// with the preset `fuzz`, the readers run under the address and undefined-behaviour sanitizers. The last line is a JSON
+// object; exit code 1 if one of our readers crashed, hung, or threw what is no refusal.
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <fstream>
 #include <map>
+#include <new>
 #include <string>
 
 #include "tests/fuzz/mutate.h"
@@ -18,6 +28,9 @@
 namespace feeler::fuzz {
 namespace {
 
+constexpr unsigned kHang_s = 60;
+constexpr std::uint64_t kKeepEach = 5000;  // inputs between two states on disk
+
 struct Options {
   std::uint64_t runs = 1000;
   std::uint64_t seed = 1;
@@ -25,69 +38,127 @@ struct Options {
   std::string state;
 };
 
+/// Of one reader. It lies in memory that parent and child share.
 struct Progress {
   std::uint64_t next = 0;  ///< input that runs, or would run, next
+  std::uint64_t refused = 0;
+  std::uint64_t unexpected = 0;  ///< exceptions that are no refusals, refusals that are no messages
   std::uint64_t crashes = 0;
-  bool running = false;
+  double cpu_s = 0.0;
 };
 
-std::map<std::string, Progress> ReadState(const std::string& file) {
-  std::map<std::string, Progress> state;
+using States = std::map<std::string, Progress>;
+
+States ReadState(const std::string& file) {
+  States state;
   std::ifstream in(file);
   std::string name;
-  for (Progress p; in >> name >> p.next >> p.crashes >> p.running;) state[name] = p;
-  for (auto& [reader, p] : state) {
-    if (!p.running) continue;  // it ended within this input
-    ++p.crashes;
-    ++p.next;
-    p.running = false;
-  }
+  for (Progress p; in >> name >> p.next >> p.refused >> p.unexpected >> p.crashes >> p.cpu_s;) state[name] = p;
   return state;
 }
 
-void WriteState(const std::string& file, const std::map<std::string, Progress>& state) {
+void WriteState(const std::string& file, const States& state) {
   if (file.empty()) return;
   std::ofstream out(file + ".part");
-  for (const auto& [name, p] : state) out << name << " " << p.next << " " << p.crashes << " " << p.running << "\n";
+  for (const auto& [name, p] : state) {
+    out << name << " " << p.next << " " << p.refused << " " << p.unexpected << " " << p.crashes << " " << p.cpu_s
+        << "\n";
+  }
   out.close();
   std::rename((file + ".part").c_str(), file.c_str());
 }
 
-int Run(const Options& options) {
-  constexpr std::uint64_t kKeepEach = 1000;
-  std::map<std::string, Progress> state = ReadState(options.state);
-  std::uint64_t runs = 0, refused = 0, unexpected = 0, crashes = 0;
-  const std::clock_t begin = std::clock();
-  for (const Reader& reader : Readers()) {
-    if (!options.reader.empty() && options.reader != reader.name) continue;
-    const std::vector<std::string> seeds = Seeds(reader);
-    Progress& progress = state[reader.name];
-    for (; progress.next < options.runs; ++progress.next) {
-      if (progress.next % kKeepEach == 0) {
-        progress.running = true;
-        WriteState(options.state, state);
-      }
-      RandomStream random(options.seed, progress.next, reader.name);
-      try {
-        refused += ReadOnce(reader, Mutate(seeds, random)) ? 0 : 1;
-      } catch (const std::exception& error) {
-        ++unexpected;
-        std::fprintf(stderr, "%s, input %llu of seed %llu: %s\n", reader.name,
-                     static_cast<unsigned long long>(progress.next), static_cast<unsigned long long>(options.seed),
-                     error.what());
-      }
-      ++runs;
+/// In the child: inputs up to `end`.
+void Work(const Reader& reader, const std::vector<std::string>& seeds, const Options& options, std::uint64_t end,
+          Progress& progress) {
+  for (; progress.next < end; ++progress.next) {
+    alarm(kHang_s);
+    RandomStream random(options.seed, progress.next, reader.name);
+    try {
+      if (!ReadOnce(reader, Mutate(seeds, random))) ++progress.refused;
+    } catch (const std::bad_alloc&) {
+      ++progress.refused;  // the command line says so in one line
+    } catch (const std::exception& error) {
+      ++progress.unexpected;
+      std::fprintf(stderr, "%s, input %llu of seed %llu: %s\n", reader.name,
+                   static_cast<unsigned long long>(progress.next), static_cast<unsigned long long>(options.seed),
+                   error.what());
     }
-    progress.running = false;
-    crashes += progress.crashes;
-    WriteState(options.state, state);
-    std::fprintf(stderr, "%-16s %llu inputs\n", reader.name, static_cast<unsigned long long>(progress.next));
   }
-  std::printf("{\"runs\": %llu, \"refused\": %llu, \"unexpected\": %llu, \"crashes\": %llu, \"cpu_s\": %.1f}\n",
-              static_cast<unsigned long long>(runs), static_cast<unsigned long long>(refused),
-              static_cast<unsigned long long>(unexpected), static_cast<unsigned long long>(crashes),
-              static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
-  return unexpected + crashes > 0 ? 1 : 0;
+}
+
+void RunReader(const Reader& reader, const std::vector<std::string>& seeds, const Options& options, std::uint64_t runs,
+               States& states, Progress& shared) {
+  shared = states[reader.name];
+  while (shared.next < runs) {
+    const std::uint64_t end = std::min(runs, shared.next + kKeepEach);
+    const pid_t child = fork();
+    if (child == 0) {
+      Work(reader, seeds, options, end, shared);
+      std::fflush(nullptr);
+      _exit(0);  // what the parent made stays
+    }
+    int status = 0;
+    rusage usage{};
+    if (child < 0 || wait4(child, &status, 0, &usage) != child) std::abort();
+    const auto seconds = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    shared.cpu_s += seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    if (shared.next < end) {
+      std::fprintf(stderr, "%s, input %llu of seed %llu: ended the process (status %d)\n", reader.name,
+                   static_cast<unsigned long long>(shared.next), static_cast<unsigned long long>(options.seed), status);
+      ++shared.crashes;
+      ++shared.next;
+    }
+    states[reader.name] = shared;
+    WriteState(options.state, states);
+  }
+  const Progress& p = states[reader.name] = shared;
+  std::fprintf(stderr, "%-16s %9llu inputs, %9llu refused, %llu crashes, %llu unexpected, %.0f s of CPU\n", reader.name,
+               static_cast<unsigned long long>(p.next), static_cast<unsigned long long>(p.refused),
+               static_cast<unsigned long long>(p.crashes), static_cast<unsigned long long>(p.unexpected), p.cpu_s);
+}
+
+std::vector<std::pair<Reader, std::vector<std::string>>> AllReaders(const std::string& wanted) {
+  std::vector<std::pair<Reader, std::vector<std::string>>> all;
+  for (const Reader& reader : Readers()) {
+    if (wanted.empty() || wanted == reader.name) all.emplace_back(reader, Seeds(reader));
+  }
+#ifdef FEELER_FUZZ_MORE
+  for (const Reader& reader : MoreReaders()) {
+    if (wanted.empty() || wanted == reader.name) all.emplace_back(reader, MoreSeeds(reader));
+  }
+#endif
+  return all;
+}
+
+int Run(const Options& options) {
+  void* memory = mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return 2;
+  auto& shared = *new (memory) Progress;
+  const auto readers = AllReaders(options.reader);
+  if (readers.empty()) return 2;
+  States states = ReadState(options.state);
+  Progress ours;
+  std::uint64_t third_party_crashes = 0;
+  for (std::size_t i = 0; i < readers.size(); ++i) {
+    const auto& [reader, seeds] = readers[i];
+    const std::uint64_t runs = options.runs * (i + 1) / readers.size() - options.runs * i / readers.size();
+    RunReader(reader, seeds, options, runs, states, shared);
+    ours.next += shared.next;
+    ours.refused += shared.refused;
+    ours.unexpected += shared.unexpected;
+    ours.cpu_s += shared.cpu_s;
+    (reader.third_party ? third_party_crashes : ours.crashes) += shared.crashes;
+  }
+  std::printf(
+      "{\"readers\": %zu, \"runs\": %llu, \"refused\": %llu, \"unexpected\": %llu, \"crashes\": %llu, "
+      "\"third_party_crashes\": %llu, \"cpu_h\": %.3f}\n",
+      readers.size(), static_cast<unsigned long long>(ours.next), static_cast<unsigned long long>(ours.refused),
+      static_cast<unsigned long long>(ours.unexpected), static_cast<unsigned long long>(ours.crashes),
+      static_cast<unsigned long long>(third_party_crashes), ours.cpu_s / 3600);
+  return ours.unexpected + ours.crashes > 0 ? 1 : 0;
 }
 
 }  // namespace

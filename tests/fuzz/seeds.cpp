@@ -1,14 +1,23 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <type_traits>
 
+#include "feeler/core/error.h"
+#include "feeler/execution/remote/protocol/messages.h"
 #include "feeler/perception/depth_file.h"
 #include "feeler/perception/uncertainty_table.h"
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/contact/contact_map_file.h"
+#include "feeler/planner/pomdp/files/alpha_file.h"
+#include "feeler/planner/pomdp/files/pomdp_file.h"
+#include "feeler/planner/pomdp/search/solve_pomdp.h"
 #include "feeler/planner/solve.h"
+#include "feeler/policies/io/controller_json.h"
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/policies/io/policy_blob.h"
 #include "feeler/policies/io/policy_json.h"
+#include "feeler/policies/io/pomdp_export.h"
 #include "tests/fuzz/readers.h"
 
 namespace feeler::fuzz {
@@ -67,6 +76,55 @@ std::string Table() {
   return perception::ToJson(table);
 }
 
+/// Policies of the tiger: "controller", "alpha" or "policyx".
+std::string TigerPolicy(std::string_view form) {
+  const planner::Pomdp tiger = planner::ParseCassandraPomdp(TigerText(), "tiger");
+  planner::PomdpSolverOptions options;
+  options.kind = planner::PomdpSolverKind::kPointBased;
+  options.expansion_limit = 200;
+  const planner::PomdpResult result = planner::SolvePomdp(tiger, options);
+  if (form == "controller") return policies::FormatController(tiger, *result.controller, result.value_lower);
+  return form == "alpha" ? planner::FormatAlpha(tiger, result.alphas) : planner::FormatPolicyx(tiger, result.alphas);
+}
+
+std::string SmallContactMap() {
+  const CellBox box{{-1, -1, 0}, {1, 1, 2}};
+  planner::ContactMap::Layer layer;
+  layer.blocked.assign(static_cast<std::size_t>(box.Count()), 0);
+  for (std::vector<float>& travel : layer.travel) travel.assign(layer.blocked.size(), 2.5F);
+  return planner::EncodeContactMap(planner::ContactMap(box, {layer}, {0.1, 0.2, 0.3}, 0.4));
+}
+
+std::vector<std::string> WireMessages(bool requests) {
+  std::vector<std::string> lines;
+  for (const auto form : {execution::WireForm::kJson, execution::WireForm::kNumbers}) {
+    const auto add = [&](const auto& message) {
+      try {
+        if constexpr (std::is_convertible_v<decltype(message), execution::Request>) {
+          lines.push_back(execution::EncodeRequest(form, lines.size() + 1, message));
+        } else {
+          lines.push_back(execution::EncodeReply(form, lines.size() + 1, message));
+        }
+      } catch (const Error&) {  // NOLINT(bugprone-empty-catch): numbers alone cannot say all
+      }
+    };
+    if (requests) {
+      add(execution::HelloRequest{});
+      add(execution::TransferRequest{});
+      add(execution::LinearRequest{});
+      add(execution::EpisodeRequest{});
+      add(execution::StopRequest{});
+    } else {
+      add(execution::WelcomeReply{});
+      add(execution::StateReply{});
+      add(execution::ContactReply{});
+      add(execution::EpisodeReply{});
+      add(execution::VerdictReply{});
+    }
+  }
+  return lines;
+}
+
 }  // namespace
 
 std::vector<std::string> Seeds(const Reader& reader) {
@@ -78,6 +136,14 @@ std::vector<std::string> Seeds(const Reader& reader) {
   if (name == "depth") return DepthImages();
   if (name == "intrinsics") return {perception::ToJson(perception::CameraIntrinsics{640, 480, 600, 600, 320, 240})};
   if (name == "table") return {Table()};
+  if (name == "pomdp") return {TigerText()};
+  if (name == "pomdpx") {
+    const auto slot = policies::ReadLatticeProblem(FEELER_SOURCE_DIR "/tests/data/slot2d.json");
+    return {policies::FormatPomdpx(planner::MakeLatticeProblem(slot))};
+  }
+  if (name == "controller" || name == "alpha" || name == "policyx") return {TigerPolicy(name)};
+  if (name == "contact_map") return {SmallContactMap()};
+  if (name == "wire_request" || name == "wire_reply") return WireMessages(name == "wire_request");
   return ProblemFiles();
 }
 

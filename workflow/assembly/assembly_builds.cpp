@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 
+#include "feeler/core/json_depth.h"
 #include "feeler/core/worker_pool.h"
 #include "feeler/workflow/scale/ordered_pieces.h"
 #include "feeler/workflow/scale/shard.h"
@@ -78,7 +79,7 @@ void ServeAssemblies(const Assembly& assembly, const AssemblyPlan& plan, const A
 AssemblyRecord SummaryRecord(const std::vector<std::string>& lines) {
   AssemblyRecord record;
   for (const std::string& line : lines) {
-    const auto json = nlohmann::json::parse(line);
+    const auto json = ParseJsonText<nlohmann::json>(line);
     record.assembly = json.at("assembly");
     record.seed = json.at("seed");
     if (!json.contains("step")) {

@@ -9,6 +9,7 @@
 
 #include "feeler/core/clock.h"
 #include "feeler/core/error.h"
+#include "feeler/env/model/contact_settings.h"
 #include "feeler/env/model/task_pieces.h"
 #include "feeler/env/scene/oversize_target.h"
 #include "feeler/execution/records/scored_reason.h"
@@ -170,6 +171,10 @@ void EpisodeRunner::Score(EpisodeRecord& record) {
     record.error = PoseErrorOf(task, record.world_T_true, *record.execution.world_T_estimate);
     record.localized = WithinTolerance(task.tolerance, *record.error);
   }
+  const env::World& world = environment_->robot().world();
+  const env::Scene& scene = world.scene();
+  record.contact_parameters =
+      env::ContactParameters(world.model(), scene.tool_geoms, scene.target_geoms, scene.tool_body, scene.target_body);
   record.inserted = verdict.inserted;
   record.verdict = env::ToString(verdict.reason);
   record.depth_m = verdict.depth_m;

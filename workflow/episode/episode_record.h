@@ -19,7 +19,8 @@ struct EpisodeRecord {
   std::string task;
   std::string policy;
   std::string noise;
-  std::map<std::string, double> fault_values;  ///< what the faults with ranges came to, in their units
+  std::map<std::string, double> fault_values;        ///< what the faults with ranges came to, in their units
+  std::map<std::string, double> contact_parameters;  ///< env::ContactParameters of its physics
   std::uint64_t seed = 0;
   std::uint64_t episode = 0;
   std::string placement = "nominal";  ///< how the place of the target was drawn

@@ -100,6 +100,7 @@ execution::VerdictReply ServedEpisodes::Judge() {
   verdict_.world_T_true = record_.world_T_true;
   verdict_.truth_outside = record_.truth_outside;
   verdict_.fault_values = record_.fault_values;
+  verdict_.contact_parameters = record_.contact_parameters;
   verdict_.inserted = record_.inserted;
   verdict_.reason = record_.verdict;
   verdict_.depth_m = record_.depth_m;

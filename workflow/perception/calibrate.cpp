@@ -55,8 +55,7 @@ void Place(const CalibrationOptions& options, CalibrationSample& sample) {
 
 /// Throws whatever for a line that is none.
 CalibrationSample SampleFrom(const std::string& line, const std::string& path, const CalibrationOptions& options) {
-  if (IsNestedDeeper(line)) throw InputError(path, "is nested too deep", "take the poses again");
-  const auto json = nlohmann::json::parse(line);
+  const auto json = ParseJsonText<nlohmann::json>(line);
   CalibrationSample sample;
   sample.index = json.at("index").get<std::int64_t>();
   sample.found = json.at("found").get<bool>();
@@ -73,7 +72,7 @@ CalibrationSample SampleFrom(const std::string& line, const std::string& path, c
 
 using Samples = std::vector<std::optional<CalibrationSample>>;
 
-/// The samples that an interrupted run left; none if it had other settings. A last line that is cut off is dropped.
+/// The samples that an interrupted run left. A last line that is cut off is dropped.
 Samples ReadPartial(const std::string& path, const std::string& settings, const CalibrationOptions& options) {
   Samples samples(2 * static_cast<std::size_t>(options.poses));
   std::ifstream in(path);
@@ -90,13 +89,13 @@ Samples ReadPartial(const std::string& path, const std::string& settings, const 
   return samples;
 }
 
-/// The file of a shard is continued, never replaced.
-void RequireOwnShard(const std::string& path, const std::string& settings) {
+/// Measured poses are continued, never replaced.
+void RequireOwnPoses(const std::string& path, const std::string& settings) {
   std::ifstream in(path);
   std::string line;
   if (!in || !std::getline(in, line) || line == settings) return;
-  throw InputError(path, "exists and is no shard of a calibration with these settings: it is not overwritten",
-                   "choose another name");
+  throw InputError(path, "exists and holds no poses of a calibration with these settings: it is not overwritten",
+                   "give the settings that it was made with, move it away, or choose another --out");
 }
 
 /// Adds what the shards hold.
@@ -105,7 +104,10 @@ void AddShards(const std::string& settings, const CalibrationOptions& options, S
   for (const std::string& path : options.from) {
     std::ifstream in(path);
     std::string line;
-    if (!in) throw InputError(path, "cannot be read", "give what feeler perceive calibrate --shard left");
+    std::error_code error;
+    if (!in || !std::filesystem::is_regular_file(path, error)) {
+      throw InputError(path, "cannot be read as a file", "give what feeler perceive calibrate --shard left");
+    }
     if (!std::getline(in, line) || line != settings) {
       throw InputError(path, "is no shard of a calibration with these settings",
                        "give the task, --poses, --installations, --frames and --seed that it was made with");
@@ -195,7 +197,32 @@ nlohmann::ordered_json ErrorsJson(const ErrorSummary& errors) {
           {"gross", errors.gross}};
 }
 
+nlohmann::ordered_json NegativesJson(const std::vector<KnownNegative>& negatives) {
+  nlohmann::ordered_json shown = nlohmann::ordered_json::array();
+  for (const KnownNegative& n : negatives) {
+    shown.push_back({{"kind", n.kind}, {"what", n.what}, {"found", n.found}, {"fitness", n.fitness}});
+  }
+  const auto found = std::count_if(negatives.begin(), negatives.end(), [](const auto& n) { return n.found; });
+  return {{"shown", negatives.size()}, {"found", found}, {"each", std::move(shown)}};
+}
+
 }  // namespace
+
+std::string NegativesLine(const std::vector<KnownNegative>& negatives) {
+  const auto count = [&](const char* kind) {
+    return std::count_if(negatives.begin(), negatives.end(), [&](const auto& n) { return n.kind == kind; });
+  };
+  std::string taken;
+  int found = 0;
+  for (const KnownNegative& n : negatives) {
+    if (!n.found) continue;
+    ++found;
+    taken += (taken.empty() ? ": " : ", ") + n.kind + " " + n.what;
+  }
+  return fmt::format(
+      "known negatives: {} of {} are taken for the target ({} plates, {} boxes, {} parts of other tasks){}\n", found,
+      negatives.size(), count("plate"), count("box"), count("part"), taken);
+}
 
 void CalibrationOptions::Validate() const {
   constexpr int kMostPoses = 1000000;
@@ -222,8 +249,10 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
 
   const std::string settings = SettingsJson(calibration.table.fingerprint, options).dump();
   Samples samples(2 * static_cast<std::size_t>(options.poses));
-  if (options.shard) RequireOwnShard(options.partial, settings);
-  if (!options.partial.empty()) samples = ReadPartial(options.partial, settings, options);
+  if (!options.partial.empty()) {
+    RequireOwnPoses(options.partial, settings);
+    samples = ReadPartial(options.partial, settings, options);
+  }
   AddShards(settings, options, samples);
   std::ofstream partial;
   if (!options.partial.empty()) {
@@ -265,6 +294,11 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   for (const CalibrationSample& sample : calibration.samples) calibration.not_found += sample.found ? 0 : 1;
   calibration.complete = calibration.samples.size() == samples.size() && !options.shard;
   if (!calibration.complete) return calibration;
+  calibration.negatives = TryKnownNegatives(*finder, task_model, calibration.table.camera_m, options.cancellation);
+  if (options.cancellation != nullptr && options.cancellation->cancelled()) {  // the poses are kept: run it again
+    calibration.complete = false;
+    return calibration;
+  }
 
   const std::vector<perception::PoseSample> made_from = Found(calibration.samples, false);
   const std::vector<perception::PoseSample> held_out = Found(calibration.samples, true);
@@ -272,12 +306,13 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   calibration.made_from = ScoreTable(calibration.table, calibration.table.rules, made_from);
   calibration.held_out = ScoreTable(calibration.table, calibration.table.rules, held_out);
   calibration.held_out_plain = ScoreTable(calibration.table, calibration.table.plain_rules, held_out);
-  if (!options.partial.empty()) {
-    partial.close();
-    std::error_code ignored;
-    std::filesystem::remove(options.partial, ignored);
-  }
   return calibration;
+}
+
+void RemovePartial(const CalibrationOptions& options) {
+  if (options.partial.empty() || options.shard) return;
+  std::error_code ignored;
+  std::filesystem::remove(options.partial, ignored);
 }
 
 void ServeCalibration(const env::TaskModel& task_model, const CalibrationOptions& options) {
@@ -319,6 +354,7 @@ ErrorSummary SummarizeErrors(const Calibration& calibration, bool correct) {
 std::string ReportJson(const Calibration& calibration, const CalibrationOptions& options) {
   nlohmann::ordered_json json = SettingsJson(calibration.table.fingerprint, options);
   json["not_found"] = calibration.not_found;
+  json["negatives"] = NegativesJson(calibration.negatives);
   json["made_from"] = ScoreJson(calibration.made_from);
   json["held_out"] = ScoreJson(calibration.held_out);
   json["held_out_without_bias_correction"] = ScoreJson(calibration.held_out_plain);

@@ -10,6 +10,7 @@
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/vision/depth_noise.h"
 #include "feeler/perception/uncertainty_table.h"
+#include "feeler/workflow/perception/known_negatives.h"
 #include "feeler/workflow/perception/perceive.h"
 #include "feeler/workflow/scale/ranks.h"
 #include "feeler/workflow/scale/shard.h"
@@ -53,15 +54,20 @@ struct Calibration {
   perception::UncertaintyTable table;
   perception::TableScore made_from, held_out, held_out_plain;
   int not_found = 0;
+  std::vector<KnownNegative> negatives;  ///< what is not the target, and whether it is taken for it
 };
 
 /// Photographs the target at places drawn over the workspace, by cameras of several installations, registers it, and
 /// makes the uncertainty table from what estimates and truth differ by. One half of poses and installations makes the
 /// table, the other judges it. Sample k is drawn from (seed, k): the same at any number of threads. A target that is
 /// not found makes no rule; it counts in `not_found`.
+/// Beside the poses, known negatives are shown to the finder.
 /// A shard leaves its poses in `partial`. Throws InputError for a file of `from` that is of other settings, or holds a
 /// pose that another holds too, or none.
 Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions& options);
+
+/// Removes the file of finished poses: to be called once the table that is made from them is kept.
+void RemovePartial(const CalibrationOptions& options);
 
 /// On a rank that works for another: takes the poses that it asks for.
 void ServeCalibration(const env::TaskModel& task_model, const CalibrationOptions& options);
@@ -78,6 +84,9 @@ struct ErrorSummary {
 };
 /// Of the estimates as they are, or, with `correct`, with the bias of the table taken out.
 ErrorSummary SummarizeErrors(const Calibration& calibration, bool correct);
+
+/// "known negatives: 0 of 14 are taken for the target (3 plates, 3 boxes, 8 parts of other tasks)", and which.
+std::string NegativesLine(const std::vector<KnownNegative>& negatives);
 
 /// What `feeler perceive calibrate` and the table's own report say of it.
 std::string ReportJson(const Calibration& calibration, const CalibrationOptions& options);

@@ -35,8 +35,10 @@ double ProcessSeconds() {
 class ScratchFolder {
  public:
   ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "feeler-estimate-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw InputError(name, "cannot be created", "let TMPDIR name a folder");
+    std::error_code error;
+    std::string name = (std::filesystem::temp_directory_path(error) / "feeler-estimate-XXXXXX").string();
+    if (error || mkdtemp(name.data()) == nullptr)
+      throw InputError(name, "cannot be created", "let TMPDIR name a folder");
     path_ = name;
   }
   ~ScratchFolder() {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "feeler/core/json_depth.h"
 #include "feeler/env/contact/contact_map_cache.h"
 #include "feeler/env/model/fingerprint.h"
 #include "feeler/workflow/setup/contact_speeds.h"
@@ -11,7 +12,7 @@ namespace {
 
 /// Settings name the kind of cost only where it is not distance.
 CostKind KindOf(const policies::DatabaseIdentity& identity) {
-  const auto settings = nlohmann::json::parse(identity.settings, nullptr, false);
+  const auto settings = ParseJsonText<nlohmann::json>(identity.settings);
   const bool time = settings.is_object() && settings.value("cost", "") == ToString(CostKind::kTime);
   return time ? CostKind::kTime : CostKind::kDistance;
 }

@@ -144,7 +144,8 @@ struct EpisodeReply {  ///< what an executor is told of an episode
 struct VerdictReply {
   Pose world_T_true = Pose::Identity();  ///< of the target
   bool truth_outside = false;
-  std::map<std::string, double> fault_values;  ///< what faults with ranges came to, in their units
+  std::map<std::string, double> fault_values;        ///< what faults with ranges came to, in their units
+  std::map<std::string, double> contact_parameters;  ///< how contact feels there (docs/file-formats.md); may be empty
   bool inserted = false;
   std::string reason;  ///< of the judge
   double depth_m = 0.0;

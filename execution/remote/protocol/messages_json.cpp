@@ -159,6 +159,7 @@ struct ReplyBody {
             {"true_pose", PoseRows(m.world_T_true)},
             {"truth_outside", m.truth_outside},
             {"fault_values", m.fault_values},
+            {"contact_parameters", m.contact_parameters},
             {"inserted", m.inserted},
             {"reason", m.reason},
             {"depth_m", m.depth_m},
@@ -324,10 +325,14 @@ VerdictReply VerdictOf(const json& item) {
   VerdictReply m;
   m.world_T_true = PoseOf(item["true_pose"]);
   m.truth_outside = item["truth_outside"].get<bool>();
-  for (const auto& [fault, value] : item["fault_values"].items()) {
-    if (!value.is_number()) throw InputError("robot message", "a fault's value is no number", "send numbers");
-    m.fault_values[fault] = value.get<double>();
-  }
+  const auto numbers = [&](const char* key, std::map<std::string, double>& values) {
+    for (const auto& [name, value] : item[key].items()) {
+      if (!value.is_number()) throw InputError("robot message", std::string(key) + " holds no number", "send numbers");
+      values[name] = value.get<double>();
+    }
+  };
+  numbers("fault_values", m.fault_values);
+  if (item.contains("contact_parameters")) numbers("contact_parameters", m.contact_parameters);
   m.inserted = item["inserted"].get<bool>();
   m.reason = item["reason"].get<std::string>();
   m.depth_m = item["depth_m"].get<double>();

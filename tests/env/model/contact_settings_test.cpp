@@ -114,6 +114,27 @@ TEST(Numbers, OfAnIncludedFileAreNamedWithThatFileAndItsLine) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(ContactParameters, TellModelsThatFeelDifferent) {
+  const auto of = [](const std::function<void(TaskText&)>& change) {
+    TaskText text;
+    change(text);
+    const TaskModel m = LoadTaskFromText(text.Mjcf(), "peg.xml");
+    return ContactParameters(*m.model, m.tool_geoms, m.target_geoms, m.tool_body, m.target_body);
+  };
+  const auto plain = of([](TaskText&) {});
+  EXPECT_EQ(plain, of([](TaskText& t) { t.numbers["feeler_cost"] = "2 0 0"; })) << "costs are not felt";
+  const auto rough = of(Insert("name=\"east\"", " friction=\"0.4 0.005 0.0001\""));
+  EXPECT_EQ(rough.at("friction_least"), 0.4);
+  EXPECT_GT(rough.at("friction_most"), 0.4);
+  for (const std::string& change : {std::string(" friction=\"0.4 0.005 0.0001\""), std::string(" solref=\"0.03 1\""),
+                                    std::string(" solimp=\"0.8 0.9 0.001\""), std::string(" condim=\"6\"")}) {
+    EXPECT_NE(of(Insert("name=\"east\"", change.c_str())).at("digest"), plain.at("digest")) << change;
+  }
+  const auto heavy = of(Insert("name=\"peg\"", " mass=\"0.7\""));
+  EXPECT_EQ(heavy.at("tool_mass_kg"), 0.7);
+  EXPECT_NE(heavy.at("digest"), plain.at("digest"));
+}
+
 TEST(Meshes, FlatIsOneLineWithItsName) {
   testing::internal::CaptureStderr();
   const std::string message = RefusalOf([](TaskText& t) {

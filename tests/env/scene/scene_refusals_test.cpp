@@ -108,6 +108,11 @@ TEST(SceneRefusals, AStateOfAnotherModelOrOfNoNumbers) {
 
 TEST(SceneRefusals, FaultsOfTheUrdfAreNamed) {
   ExpectNamed(UrdfError("<mass value=\"7.369\"/>", "<mass value=\"nan\"/>"), {"ur10e.urdf", "shoulder_link", "mass"});
+  ExpectNamed(UrdfError("<mass value=\"7.369\"/>", "<mass value=\"heavy\"/>"), {"shoulder_link", "mass", "heavy"});
+  for (const char* bad : {"nan", "strong", "1e999"}) {
+    ExpectNamed(UrdfError("effort=\"330\"", std::string("effort=\"") + bad + "\""),
+                {"ur10e.urdf: <joint name=\"shoulder_pan_joint\"><limit>", "effort", bad});
+  }
 }
 
 /// A host program's locale, as a German one: decimal commas and grouping, for streams and for C.

@@ -21,6 +21,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/core/interrupted.h"
+#include "feeler/core/json_depth.h"
 #include "feeler/workflow/scale/mpi/mpi_post.h"
 
 namespace feeler::workflow {
@@ -86,7 +87,7 @@ std::string ToBytes(const Greeting& greeting) {
 }
 
 Greeting GreetingFrom(const std::string& bytes) {
-  const auto json = nlohmann::json::parse(bytes);
+  const auto json = ParseJsonText<nlohmann::json>(bytes);
   return {json.at("host"), json.at("identity"), json.at("threads"), json.at("failure"), json.at("exit_code")};
 }
 
@@ -99,8 +100,8 @@ Greeting GreetingFrom(const std::string& bytes) {
 /// Names the first entry in which two identities differ.
 void RequireSame(const std::string& own, const Greeting& other, int rank) {
   if (own == other.identity) return;
-  const auto mine = nlohmann::json::parse(own);
-  const auto theirs = nlohmann::json::parse(other.identity, nullptr, false);
+  const auto mine = ParseJsonText<nlohmann::json>(own);
+  const auto theirs = ParseJsonText<nlohmann::json>(other.identity);
   std::string what = "command";
   for (const auto& [key, value] : mine.items()) {
     if (theirs.is_object() && theirs.contains(key) && theirs[key] == value) continue;
