@@ -94,7 +94,9 @@ void Executing::FindArm() {
   const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
   if (told && !name.empty() && plain) {
     const std::filesystem::path file = FindData("models") / "robots" / (name + ".urdf");
-    if (std::filesystem::exists(file)) arm_.emplace(planner::SerialArm::FromUrdf(file.string(), flags_.arm_base));
+    std::error_code unreadable;
+    if (std::filesystem::exists(file, unreadable))
+      arm_.emplace(planner::SerialArm::FromUrdf(file.string(), flags_.arm_base));
   }
   if (!arm_) {
     Note("feeler: joint limits and singularities are left to the robot: {}\n",

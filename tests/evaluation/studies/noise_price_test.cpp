@@ -44,7 +44,9 @@ TEST(NoisePrice, KnowingOfItPays) {
     const bool noisy = column(row, "level") > 0.0;
     EXPECT_LE(column(row, "lower"), column(row, "cost") + 1e-9);
     EXPECT_LE(column(row, "cost"), column(row, "unaware_cost") * protocol.gap + 1e-9);
-    if (!noisy) EXPECT_NEAR(column(row, "unaware_right"), 1.0, 1e-9);
+    if (!noisy) {
+      EXPECT_NEAR(column(row, "unaware_right"), 1.0, 1e-9);
+    }
   }
   ASSERT_EQ(result.figures.size(), 2U);
   EXPECT_EQ(result.figures[0].series.size(), 6U);
