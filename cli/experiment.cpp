@@ -14,7 +14,7 @@
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
-#include "feeler/evaluation/harness/experiment_on_ranks.h"
+#include "feeler/evaluation/experiment_on_ranks.h"
 #include "feeler/evaluation/registry.h"
 
 namespace feeler::cli {

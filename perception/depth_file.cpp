@@ -84,13 +84,12 @@ constexpr std::array<DepthUnit, 7> kDepthUnits{{{1e-3, "0.001 (millimetres)"},
                                                 {1e-2, "0.01 (centimetres)"},
                                                 {1e-5, "0.00001 (hundredths of a millimetre)"}}};
 
-/// The units that would put `seen_m` near `expected_m`, best first.
-std::string FittingUnits(double seen_m, double expected_m, double depth_scale_m) {
-  constexpr double kNear = 1.4;
+/// The units that would put `seen_m` within a factor `near` of `expected_m`, best first.
+std::string FittingUnits(double seen_m, double expected_m, double near, double depth_scale_m) {
   std::vector<std::pair<double, const char*>> fitting;
   for (const DepthUnit& unit : kDepthUnits) {
     const double off = std::abs(std::log(seen_m / depth_scale_m * unit.scale_m / expected_m));
-    if (off < std::log(kNear)) fitting.emplace_back(off, unit.name);
+    if (off < std::log(near)) fitting.emplace_back(off, unit.name);
   }
   std::sort(fitting.begin(), fitting.end());
   std::string names;
@@ -120,7 +119,7 @@ std::string GuessDepthUnit(const DepthFrame& frame, const CameraIntrinsics& came
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
   if (std::abs(std::log(*middle / p.z())) < std::log(kRight)) return "";
-  const std::string units = FittingUnits(*middle, p.z(), camera.depth_scale_m);
+  const std::string units = FittingUnits(*middle, p.z(), 1.4, camera.depth_scale_m);
   return fmt::format("; the picture is {:.3g} m deep where the target is expected at {:.3g} m: depth_scale_m {:g} {}",
                      *middle, p.z(), camera.depth_scale_m, units.empty() ? "may be wrong" : "may have to be " + units);
 }
@@ -166,8 +165,8 @@ DepthFrame ParseDepthPng(std::string_view bytes, const CameraIntrinsics& camera,
     }
   }
   if (farthest > 0.0F && (farthest < 0.02F || nearest > 50.0F)) {
-    constexpr double kUsual_m = 1.0;
-    const std::string units = FittingUnits(std::sqrt(nearest * farthest), kUsual_m, camera.depth_scale_m);
+    constexpr double kUsual_m = 1.0;  // of a camera over a table: a third to three metres
+    const std::string units = FittingUnits(std::sqrt(nearest * farthest), kUsual_m, 3.0, camera.depth_scale_m);
     throw InputError(
         where, fmt::format("depths from {:.4g} to {:.4g} m", nearest, farthest),
         "set depth_scale_m of the intrinsics to the metres per unit" + (units.empty() ? "" : ": it may be " + units));

@@ -94,8 +94,8 @@ void Executing::FindArm() {
   const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
   if (told && !name.empty() && plain) {
     const std::filesystem::path file = FindData("models") / "robots" / (name + ".urdf");
-    std::error_code unreadable;
-    if (std::filesystem::exists(file, unreadable))
+    std::error_code ignored;
+    if (std::filesystem::exists(file, ignored))
       arm_.emplace(planner::SerialArm::FromUrdf(file.string(), flags_.arm_base));
   }
   if (!arm_) {

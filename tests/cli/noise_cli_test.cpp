@@ -87,7 +87,7 @@ TEST(NoiseCommands, WhatSaysNothingOrDoesNotFitIsNamed) {
   ExpectOneError(solve(plain, {"--confidence", "0.9"}), "--confidence");
   ExpectOneError(RunFeeler({"export", "--problem", noisy, "--format", "pomdpx"}), "--format");
   ExpectOneError(RunFeeler({"export", "--problem", noisy, "--upper-bound", "20"}), "--upper-bound");
-  ExpectOneError(RunFeeler({"policy", "graph", "--problem", noisy, "--policy", noisy}), "policy");
+  ExpectOneError(RunFeeler({"policy", "graph", "--problem", noisy, "--policy", noisy}), "\"task\" is missing");
 }
 
 }  // namespace

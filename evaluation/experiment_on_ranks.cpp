@@ -1,4 +1,4 @@
-#include "feeler/evaluation/harness/experiment_on_ranks.h"
+#include "feeler/evaluation/experiment_on_ranks.h"
 
 #include <cstdint>
 #include <filesystem>
