@@ -180,7 +180,7 @@ ExperimentResult RunNoisePrice(const ExperimentRequest& request) {
   if (request.quick) {
     extents = {"3x3x3"};
     protocol.levels = {0.0, 0.02};
-    protocol.expansion_limit = 500;
+    protocol.expansion_limit = 5000;
   }
   for (const std::string& text : extents) {
     problems.emplace_back("plug " + text,
