@@ -54,6 +54,7 @@ class ArrayStore {
   template <class T>
   void Keep(const std::string& name, const std::vector<SharedArray<T>*>& arrays) const {
     std::vector<std::span<const std::byte>> bytes;
+    bytes.reserve(arrays.size());
     for (const SharedArray<T>* array : arrays) bytes.push_back(std::as_bytes(array->span()));
     if (Write(name, bytes)) Take(name, arrays);
   }

@@ -81,8 +81,7 @@ void NoisyBeliefGraph::SetEnd(Node& node) const {
 
 std::uint32_t NoisyBeliefGraph::Intern(const Cell& robot, std::vector<WeightedHypothesis>& belief, double total) {
   const double least = kImpossible * total;
-  const auto dropped = std::ranges::remove_if(belief, [&](const WeightedHypothesis& h) { return h.weight < least; });
-  belief.erase(dropped.begin(), dropped.end());
+  std::erase_if(belief, [&](const WeightedHypothesis& h) { return h.weight < least; });
   for (WeightedHypothesis& h : belief) h.weight /= total;
   const std::uint64_t hash = HashOf(robot, belief);
   const auto [low, high] = index_.equal_range(hash);
