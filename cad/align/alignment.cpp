@@ -130,6 +130,20 @@ struct Miss {
   Eigen::Vector2d hole = Eigen::Vector2d::Zero();
 };
 
+/// A taper goes into a taper as deep as it will: what has to fit is the tool's lower end into the target's upper.
+/// (Their middles tell nothing, for the two are seldom equally long.)
+struct Ends {
+  const SlabLoop& tool;
+  const SlabLoop& target;
+  bool tapers;
+};
+Ends EndsThatMeet(const Feature& tool, const Feature& target) {
+  const int narrow_below = tool.hole ? -1 : 1;  // a tip narrows downwards, the hole of a tool upwards
+  const bool tapers = tool.tapers == narrow_below && target.tapers == narrow_below;
+  if (!tapers) return {tool.loop, target.loop, false};
+  return {tool.low_loop, target.high_loop, true};
+}
+
 void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targets, std::vector<Trial>& trials,
                Miss& miss) {
   for (std::size_t a = 0; a < tools.size(); ++a) {
@@ -137,11 +151,13 @@ void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targ
       for (const Feature& f : tools[a].features) {
         for (const Feature& g : targets[b].features) {
           if (f.hole == g.hole) continue;
-          const double fit = f.hole ? g.area / f.area : f.area / g.area;
+          const Ends ends = EndsThatMeet(f, g);
+          double fit = f.hole ? g.area / f.area : f.area / g.area;
+          if (ends.tapers) fit = std::min(fit, 1.0);
           if (fit < 0.25 || fit > 1.15) continue;
           for (const double roll : Rolls(f, g)) {
-            const Eigen::AlignedBox2d tool_box = RolledBounds(f.loop, roll);
-            const Eigen::AlignedBox2d target_box = BoundsOf(g.loop);
+            const Eigen::AlignedBox2d tool_box = RolledBounds(ends.tool, roll);
+            const Eigen::AlignedBox2d target_box = BoundsOf(ends.target);
             const Eigen::Vector2d inner = f.hole ? target_box.sizes() : tool_box.sizes();
             const Eigen::Vector2d hole = f.hole ? tool_box.sizes() : target_box.sizes();
             const double too_wide = (inner - hole).maxCoeff();
@@ -153,7 +169,7 @@ void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targ
               trials.push_back({a, b, roll, place, f.hole, g.high_m, g.low_m, inner.minCoeff(), fit});
             };
             add(target_box.center() - tool_box.center());
-            if (f.hole) continue;
+            if (f.hole || ends.tapers) continue;
             const Eigen::AlignedBox2d tip = TipBounds(tools[a].features, f, roll);
             if ((tip.sizes() - hole).maxCoeff() > 0 || (tip.center() - tool_box.center()).norm() < 1e-5) continue;
             add(target_box.center() - tip.center());

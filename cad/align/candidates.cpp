@@ -113,20 +113,29 @@ std::vector<std::size_t> SlabsToLookAt(const std::vector<double>& levels) {
   return order;
 }
 
-/// Whether the area grows or shrinks from the lower end of the slab to the upper.
-bool Tapers(const SlabLoop& loop) {
-  SlabLoop low = loop;
-  SlabLoop high = loop;
-  for (SlabPoint& p : low) p.middle = p.low;
-  for (SlabPoint& p : high) p.middle = p.high;
-  return std::abs(SignedArea(high) - SignedArea(low)) > 1e-4 * std::abs(SignedArea(loop));
+SlabLoop LowerEnd(SlabLoop loop) {
+  for (SlabPoint& p : loop) p.middle = p.low;
+  return loop;
+}
+
+SlabLoop UpperEnd(SlabLoop loop) {
+  for (SlabPoint& p : loop) p.middle = p.high;
+  return loop;
+}
+
+/// 1 if the area grows from the lower end to the upper, -1 if it shrinks.
+int Tapers(const SlabLoop& low, const SlabLoop& high) {
+  const double low_m2 = std::abs(SignedArea(LowerEnd(low)));
+  const double high_m2 = std::abs(SignedArea(UpperEnd(high)));
+  if (std::abs(high_m2 - low_m2) <= 1e-4 * std::max(low_m2, high_m2)) return 0;
+  return high_m2 > low_m2 ? 1 : -1;
 }
 
 /// A line that goes on into the next slab, as of a prism or a taper.
 bool GoesOn(const Feature& below, const Feature& above) {
   if (below.hole != above.hole || std::abs(below.high_m - above.low_m) > 1e-9) return false;
   if (std::abs(below.area - above.area) > 0.03 * std::max(below.area, above.area)) return false;
-  if (Tapers(below.loop) != Tapers(above.loop)) return false;
+  if (Tapers(below.loop, below.loop) != Tapers(above.loop, above.loop)) return false;
   const Eigen::AlignedBox2d a = BoundsOf(below.loop);
   const Eigen::AlignedBox2d b = BoundsOf(above.loop);
   return (a.center() - b.center()).norm() < 0.02 * a.sizes().maxCoeff();
@@ -165,6 +174,11 @@ std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
     Feature feature = *at;
     feature.low_m = chain.front().low_m;
     feature.high_m = chain.back().high_m;
+    feature.tapers = Tapers(chain.front().loop, chain.back().loop);
+    if (feature.tapers != 0) {
+      feature.low_loop = LowerEnd(chain.front().loop);
+      feature.high_loop = UpperEnd(chain.back().loop);
+    }
     Dominant(feature);
     features.push_back(std::move(feature));
   }

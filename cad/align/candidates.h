@@ -20,8 +20,11 @@ struct Feature {
   bool hole = false;
   double low_m = 0.0;
   double high_m = 0.0;
-  SlabLoop loop;
-  double area = 0.0;       ///< m^2, positive
+  SlabLoop loop;           ///< half-way
+  SlabLoop low_loop;       ///< its lower end, as the `middle` of its points; set if it tapers
+  SlabLoop high_loop;      ///< its upper end
+  int tapers = 0;          ///< 1: it widens upwards, -1: downwards
+  double area = 0.0;       ///< m^2, positive; half-way
   double edge_rad = 0.0;   ///< direction in which most of its length runs, modulo half a turn
   bool has_edges = false;  ///< else it is round: every direction is as good
 };

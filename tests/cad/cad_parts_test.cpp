@@ -162,6 +162,19 @@ TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
   }
 }
 
+TEST_F(CadParts, ATaperGoesAsDeepAsItWillWhateverItsLength) {
+  const PartFiles files = WriteParts("long-taper", folder_, "step");
+  const TriangleMesh tool = Read(files.tool).mesh;
+  const TriangleMesh target = Read(files.target).mesh;
+  const Alignment alignment = FindAlignment(tool, target);
+  const Mating mating =
+      MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
+  EXPECT_NEAR(1000 * mating.depth_m, 20.0, 0.05);
+  EXPECT_FALSE(mating.tool_has_opening);
+  ASSERT_GE(mating.profile.size(), 2U);
+  EXPECT_GT(mating.profile.front().half_m.minCoeff(), mating.profile.back().half_m.minCoeff());
+}
+
 TEST_F(CadParts, WhatDoesNotFitOrFitsTwiceIsRefused) {
   const auto find = [&](const std::string& kind) {
     const PartFiles files = WriteParts(kind, folder_, "stl");

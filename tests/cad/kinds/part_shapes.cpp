@@ -152,6 +152,11 @@ Pair Taper() {
   return {Cone(6.0, 7.5, 0, 30) + Rod(0, 0, 7.5, 30, 60), Block(34, 34, -32, 0) - Cone(6.1, 7.6, -30, 0)};
 }
 
+/// The tool tapers on above the hole: the middles of the two cones are not alike.
+Pair LongTaper() {
+  return {Cone(5.0, 6.5, 0, 30) + Rod(0, 0, 6.5, 30, 60), Block(34, 34, -25, 0) - Cone(5.05, 6.05, -20, 0)};
+}
+
 Pair Rectangle(double c) { return {Block(8, 7, 0, 50), Block(25, 25, 0, 9) - Block(8 + 2 * c, 7 + 2 * c, -1, 10)}; }
 
 Pair Tilted() {
@@ -182,6 +187,7 @@ Pair Draw(const std::string& kind) {
       {"gear", Gear},
       {"hex-socket", HexSocket},
       {"taper", Taper},
+      {"long-taper", LongTaper},
       {"rectangle", [] { return Rectangle(0.1); }},
       {"tilted", Tilted},
       {"assembly", Assembled},
