@@ -94,9 +94,7 @@ function(feeler_tests room)  # the tests of `cli` run the binary
   endif()
   add_executable(${room}_tests EXCLUDE_FROM_ALL ${sources})
   add_dependencies(tests ${room}_tests)
-  if(NOT room STREQUAL cli)  # each of its files has helpers of its own by the same names
-    feeler_unity(${room}_tests ${sources})
-  endif()
+  feeler_unity(${room}_tests ${sources})
   target_link_libraries(${room}_tests PRIVATE feeler_options ${ARGN} GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")

@@ -160,6 +160,7 @@ StepResult InsertionEnv::Reset(std::uint64_t seed, const ResetOptions& options) 
     variation_.physics.clearance_m += options.physics->clearance_m;
     variation_.physics.joint_friction_nm += options.physics->joint_friction_nm;
     variation_.physics.port_stiffness_n_m = options.physics->port_stiffness_n_m;
+    variation_.physics.worn_m = options.physics->worn_m;
   }
   // Drawn even where a pose is given, for the check of the extents.
   RandomStream random(seed, options.episode, "true-pose");

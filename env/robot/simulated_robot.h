@@ -32,7 +32,7 @@ using TransferPlanner =
 struct RobotOptions {
   ComputedTorqueGains tracking;
   FrictionObserver::Options friction_observer;
-  double acceleration_m_s2 = 1.0;
+  double acceleration_m_s2 = 2.5;  ///< of straight motions: half of what transfers ask of the joints
   double angular_speed_rad_s = 1.0;
   double angular_acceleration_rad_s2 = 5.0;
   double joint_speed_fraction = 0.5;       ///< of the joints' limits, in transfers

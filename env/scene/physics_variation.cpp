@@ -9,6 +9,7 @@
 #include "feeler/core/direction.h"
 #include "feeler/core/error.h"
 #include "feeler/env/model/mujoco_handles.h"
+#include "feeler/env/scene/worn_edges.h"
 
 namespace feeler::env {
 namespace {
@@ -150,6 +151,9 @@ void PhysicsVariation::Validate() const {
     throw InputError("reset", fmt::format("the target stands on springs of {} N/m", port_stiffness_n_m),
                      "give 100 to 10000000, or 0 for a target that stands fast");
   }
+  if (!(std::abs(worn_m) <= 5e-3)) {
+    throw InputError("reset", fmt::format("edges are worn by {} m", worn_m), "give at most 0.005, either way");
+  }
   if (!std::isfinite(clearance_m)) throw InputError("reset", "the clearance is not finite", "give metres");
 }
 
@@ -164,6 +168,7 @@ std::shared_ptr<const mjModel> VariedModel(const Scene& scene, const PhysicsVari
   }
   for (int geom = 0; geom < m.ngeom; ++geom) m.geom_friction[3 * geom] *= variation.contact_friction;
   if (variation.clearance_m != 0.0) Narrow(scene, variation.clearance_m, m);
+  if (variation.worn_m != 0.0) WearEdges(scene, variation.worn_m, m);
   if (!variation.tool_slip_m.isZero() || variation.tool_turn_rad != 0.0) Slip(scene, variation, m);
   if (variation.tool_mass != 1.0) {
     for (int body = scene.tool_body; body < m.nbody; ++body) {

@@ -24,6 +24,7 @@ struct PhysicsVariation {
   double port_stiffness_n_m = 0.0;
   static constexpr double kPortTravel_m = 1e-3;
   static constexpr double kPortFriction_n = 2.0;
+  double worn_m = 0.0;  ///< the lead-in of the target is larger by this (worn_edges.h); negative: smaller
   bool operator==(const PhysicsVariation&) const = default;
   /// Throws InputError naming the number that makes no sense.
   void Validate() const;

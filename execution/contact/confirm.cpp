@@ -124,11 +124,11 @@ std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& ma
 }
 
 bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,
-                const std::string& kind, Mover& mover, std::vector<Touch>& evidence) {
+                const std::string& kind, Mover& mover, std::vector<Touch>& evidence, FreeBy free_by) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     const Eigen::Vector3d from = mover.position();
     const Eigen::Vector3d to = target + path[i].cast<double>() + map.phase();
-    const MotionReport report = mover.Fast(to, kind);
+    const MotionReport report = mover.Fast(to, kind, {}, free_by);
     if (!report.contact) {
       Touch free;
       const auto direction = DirectionOf(to - from);
@@ -159,13 +159,16 @@ TargetFit Confirm(const planner::ContactMap& map, Direction insertion, int orien
   for (int attempt = 0; attempt < attempts; ++attempt) {
     const std::array<int, 3> contacts = ContactsOnFlatGround(map, evidence, fit, insertion, orientation, options.fit);
     const int axis = LoosestAxis(fit, contacts, insertion, hopeless, contacts_wanted);
-    if (axis < 0) break;
+    if (axis < 0) {
+      if (fit.violations == 0) mover.TrustAgain();
+      break;
+    }
     const auto plan = PlanConfirmingTouch(map, mover.position() - fit.position, axis, orientation);
     if (!plan) {
       hopeless[static_cast<std::size_t>(axis)] = true;
       continue;
     }
-    if (FollowPath(map, fit.position, plan->path, "transfer", mover, evidence)) {
+    if (FollowPath(map, fit.position, plan->path, "transfer", mover, evidence, FreeBy::kEstimate)) {
       const double from = mover.position()[axis];
       const double slack = std::max(fit.half_width[axis], kLeastSlack);
       const double farthest = plan->travel_cells + slack + options.sure_overtravel_cells;

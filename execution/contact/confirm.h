@@ -29,7 +29,7 @@ std::optional<ConfirmingTouch> PlanConfirmingTouch(const planner::ContactMap& ma
 /// Moves the tool along way points relative to a target at `target` (lattice coordinates). False if a contact came; it
 /// is added to the evidence when it came along an axis, and the tool has come off it.
 bool FollowPath(const planner::ContactMap& map, const Eigen::Vector3d& target, const std::vector<Cell>& path,
-                const std::string& kind, Mover& mover, std::vector<Touch>& evidence);
+                const std::string& kind, Mover& mover, std::vector<Touch>& evidence, FreeBy free_by = FreeBy::kBelief);
 
 /// A box in lattice coordinates.
 struct Region {

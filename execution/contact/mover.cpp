@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -13,6 +14,10 @@ namespace {
 
 /// Contact force that no motion reaches: a retreat starts in contact and must not stop for it.
 constexpr double kUnwatched = 1e6;
+/// Cosine between a way and a face's normal below which the tool passes by the face, and above which it meets no edge
+/// beside it.
+constexpr double kAcross = 0.1;
+constexpr double kAlong = 0.9;
 
 }  // namespace
 
@@ -96,11 +101,18 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   return report;
 }
 
-MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted) {
+MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted,
+                         FreeBy free_by) {
   CheckLimits();
   const Eigen::Vector3d way = target - position_;
   double speed_m_s = options_.transfer_speed_m_s;
-  if (Careful() && !way.isZero()) speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
+  if (!way.isZero()) {
+    if (Careful()) {
+      speed_m_s = std::min(speed_m_s, SpeedOfCarefulWay(way.normalized()));
+    } else if (free_by == FreeBy::kEstimate) {
+      speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
+    }
+  }
   const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
   const MotionReport report = Finish(result, target, kind, predicted, true);
   if (report.contact) ++record_.contacts;
@@ -158,6 +170,26 @@ void Mover::Retreat(const Eigen::Vector3d& target) {
   Finish(robot_.LinearMove(frame_.ToWorld(target), options_.transfer_speed_m_s, kUnwatched), target, "retreat", {},
          false);
   robot_.ZeroWrench();
+}
+
+double Mover::SpeedOfCarefulWay(const Eigen::Vector3d& way) const {
+  double speed_m_s = SpeedInto(way);
+  const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * way;
+  const ContactResponse ahead = robot_.Contact(in_world);
+  // Edges push where the contact is stiffest, along the insertion; across it they are soft.
+  std::array<double, 3> stiffness_n_m{};
+  for (const int axis : {0, 1, 2}) {
+    stiffness_n_m[axis] = robot_.Contact(frame_.DirectionInWorld(MakeDirection(axis, 1))).Held().stiffness_n_m;
+  }
+  const auto stiffest = std::ranges::max_element(stiffness_n_m) - stiffness_n_m.begin();
+  for (const Direction face : kDirections) {
+    const double along = way.dot(UnitVector(face));
+    if (along > kAcross) speed_m_s = std::min(speed_m_s, SpeedInto(UnitVector(face)) / along);
+    if (AxisOf(face) != stiffest) continue;
+    if (std::abs(along) < kAlong)
+      speed_m_s = std::min(speed_m_s, SpeedOfProbe(in_world, ahead, {false, UnitVector(face)}));
+  }
+  return speed_m_s;
 }
 
 bool Mover::Careful() const { return record_.careful || !record_.ladder.empty(); }

@@ -44,6 +44,12 @@ struct MayMeet {
   std::optional<Eigen::Vector3d> edge_towards;
 };
 
+/// What says that a way is free.
+enum class FreeBy {
+  kBelief,   ///< no hypothesis left blocks it, or what is felt has pinned the target
+  kEstimate  ///< a fit to touches that are not yet confirmed: what it meets is to be met within the budget
+};
+
 /// Moves the tool in lattice coordinates, with the orientation of the estimate, and writes every motion into the
 /// record. Throws ExecutionFailure when the robot fails, answers nonsense, or the limits of the episode are exceeded.
 class Mover {
@@ -60,7 +66,8 @@ class Mover {
   double Cells(double metres) const { return metres / frame_.cell_m; }
 
   /// Fast and straight to `target`, watched for contact.
-  MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {});
+  MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {},
+                    FreeBy free_by = FreeBy::kBelief);
   /// Slowly along an axis until its coordinate is `coordinate` or a contact comes.
   MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted,
                      const MayMeet& may_meet = {});
@@ -75,6 +82,8 @@ class Mover {
   MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
   /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".
   MotionReport Follow(const TwistMotion& motion);
+  /// What is felt explains whatever a way has met: the ways from here on are known again.
+  void TrustAgain() { record_.careful = false; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
   Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
@@ -84,6 +93,9 @@ class Mover {
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
   /// The speed of a probe along `direction` (unit vector, world axes) that keeps the budget at whatever it may meet.
   double SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face, const MayMeet& may_meet) const;
+  /// The speed along `way` (unit vector, lattice axes) that keeps the budget at faces along any axis and at the edges
+  /// between them.
+  double SpeedOfCarefulWay(const Eigen::Vector3d& way) const;
   void CheckLimits() const;
   /// The world is not as the policy knows it: its plan has failed, or a transfer met something hard.
   bool Careful() const;

@@ -17,8 +17,13 @@ namespace {
 
 /// Positions nearer than this, in cells, count as the same: less than any overtravel, more than a tracking error.
 constexpr double kSamePlace = 0.1;
-/// Shorter fast motions cost more than they save.
-constexpr double kShortestFast = 0.75;
+/// A motion of its own costs so much for beginning and ending: a fast one must save more.
+constexpr double kMotion_s = 0.05;
+/// Once two touches of faces across the insertion agree within kAgree, the next face is where it is predicted but for
+/// errors of tracking and of the give of a contact: a probe of it begins kFaceMargin before it, cells. One touch is not
+/// enough: it may have met a lead-in, which is lower than the faces.
+constexpr double kFaceMargin = 0.25;
+constexpr double kAgree = 0.1;
 
 /// A wall that is met along more of the tool than this holds it: it cannot turn away. Up to here simulated contacts
 /// show no more than the mass of a tool that is met at its tip.
@@ -208,8 +213,8 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   const double behind = sign * (station[axis] - from);  // positive: a pending motion lies before the move
   const PredictedCells predicted = std::array<double, 2>{prediction.nearest + behind, prediction.farthest + behind};
 
-  const double fast = std::min<double>(move.cells, prediction.nearest - options.fast_margin_cells);
-  if (fast + behind >= kShortestFast) {
+  const double fast = std::min<double>(move.cells, prediction.nearest - FastMargin(move.direction));
+  if (FastIsWorth(move.direction, fast + behind)) {
     Eigen::Vector3d target = station;
     target[axis] += sign * fast;
     const MotionReport report = mover_.Fast(target, "transfer", predicted);
@@ -223,6 +228,18 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   return MakeTouch(
       move.direction, from,
       mover_.Probe(move.direction, end, "probe", left, WhatMayBeMet(move.direction, move.cells + overtravel)));
+}
+
+double Localizer::FastMargin(Direction direction) const {
+  const ExecutorOptions& options = mover_.options();
+  if (direction != task_.insertion || !faces_known_) return options.fast_margin_cells;
+  return std::min(options.fast_margin_cells, std::max(mover_.Cells(options.retreat_m), kFaceMargin));
+}
+
+bool Localizer::FastIsWorth(Direction direction, double cells) const {
+  const ExecutorOptions& options = mover_.options();
+  const double probe_m_s = std::min(options.probe_speed_m_s, mover_.SpeedInto(UnitVector(direction)));
+  return cells * mover_.frame().cell_m * (1.0 / probe_m_s - 1.0 / options.transfer_speed_m_s) > kMotion_s;
 }
 
 MayMeet Localizer::WhatMayBeMet(Direction direction, double cells) const {
@@ -255,6 +272,10 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tol
       const TrackedHypothesis& best = tracked_[match.best];
       const int axis = AxisOf(touch.direction);
       const double travel = PredictTravel(*problem_.map, best, touch.start, touch.direction);
+      if (touch.direction == task_.insertion) {
+        faces_known_ = face_felt_ && std::abs(touch.travelled - travel) < kAgree;
+        face_felt_ = true;
+      }
       anchor_[axis] = best.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
     const int outcomes = CountOutcomes(move);
@@ -318,7 +339,10 @@ void Localizer::RetreatFromContact(Direction direction) {
   const Eigen::Vector3d station = Station();
   const double wall = mover_.position()[axis];
   const double to_wall = SignOf(direction) * (wall - station[axis]);
-  if (to_wall < room) kept_offset_[axis] = SignOf(direction) * (to_wall - room);
+  // Not nearer than that, and no farther off a face than needed: what touches it next goes that way slowly.
+  if (to_wall < room || (direction == task_.insertion && faces_known_)) {
+    kept_offset_[axis] = SignOf(direction) * (to_wall - std::max(room, std::min(to_wall, kFaceMargin)));
+  }
   mover_.Retreat(Station());
 }
 

@@ -58,6 +58,10 @@ class Localizer {
   void Feel(const GuardedMove& move, const Prediction& prediction);
   /// What a motion of `cells` from the station may meet beside a face across its way.
   MayMeet WhatMayBeMet(Direction direction, double cells) const;
+  /// A probe begins so far, in cells, before the nearest contact that it may meet.
+  double FastMargin(Direction direction) const;
+  /// Whether a fast motion of so many cells before a probe saves time.
+  bool FastIsWorth(Direction direction, double cells) const;
   Touch ProbeAlong(const GuardedMove& move, const Prediction& prediction);
   /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
   /// the tolerance (cells).
@@ -82,6 +86,8 @@ class Localizer {
   std::vector<Touch> evidence_;
   Cell robot_;
   Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
+  bool face_felt_ = false;                                 ///< there was a contact along the insertion
+  bool faces_known_ = false;                               ///< the last one was where the one before it had put it
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
   std::optional<Eigen::Vector3d> found_inside_;
   std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()

@@ -13,18 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Progress bars aside, one line.
-void ExpectOneError(const CommandResult& result, const std::string& named) {
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_TRUE(result.out.empty()) << result.out;
-  const std::size_t begin = result.err.find("feeler: error: ");
-  ASSERT_NE(begin, std::string::npos) << result.err;
-  const std::string line = result.err.substr(begin);
-  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
-  EXPECT_NE(line.find(named), std::string::npos) << line;
-  EXPECT_TRUE(line.ends_with(")\n")) << "says not how to mend it: " << line;
-}
-
 TEST(Assemble, CheckPrintsTheDrawing) {
   const CommandResult text = RunFeeler({"assemble", "--assembly", "crane", "--check"});
   EXPECT_EQ(text.exit_code, 0) << text.err;

@@ -14,15 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void ExpectOneError(const CommandResult& result, const std::string& named) {
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_TRUE(result.out.empty()) << result.out;
-  EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
-  EXPECT_TRUE(result.err.ends_with(")\n")) << "says not how to mend it: " << result.err;
-}
-
 TEST(BadUsage, UnknownWordsAndValuesAreNamed) {
   ExpectOneError(RunFeeler({}), "subcommand");
   ExpectOneError(RunFeeler({"insert"}), "insert");

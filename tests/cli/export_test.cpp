@@ -12,14 +12,6 @@ namespace {
 
 const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
 
-void ExpectOneError(const CommandResult& result, const std::string& named) {
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_TRUE(result.out.empty()) << result.out;
-  EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
-}
-
 /// Words after `key:` at the start of a line.
 std::vector<std::string> WordsOf(const std::string& text, const std::string& key) {
   std::istringstream lines(text);

@@ -23,14 +23,6 @@ std::string Written(const std::string& folder, const std::string& noise) {
   return file;
 }
 
-void ExpectOneError(const CommandResult& result, const std::string& named) {
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_TRUE(result.out.empty()) << result.out;
-  EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
-}
-
 TEST(NoiseCommands, SolvesWritesAndExports) {
   const std::string folder = ScratchFolder("noise");
   const std::string plain = Written(folder, "");

@@ -10,14 +10,6 @@
 namespace feeler::cli {
 namespace {
 
-void ExpectOneError(const CommandResult& result, const std::string& named) {
-  EXPECT_EQ(result.exit_code, 2) << result.err;
-  EXPECT_TRUE(result.out.empty()) << result.out;
-  EXPECT_TRUE(result.err.starts_with("feeler: error: ")) << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  EXPECT_NE(result.err.find(named), std::string::npos) << result.err;
-}
-
 TEST(PomdpCommands, SolveWriteSimulate) {
   const std::string folder = ScratchFolder("pomdp");
   const std::string model = folder + "/rocks.pomdp";

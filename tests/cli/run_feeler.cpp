@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -95,6 +96,18 @@ SignalledResult SignalFeeler(const std::vector<std::string>& arguments, double a
   signalled.result = Finish(child, folder);
   signalled.ended_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return signalled;
+}
+
+void ExpectOneError(const CommandResult& result, const std::string& named) {
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_TRUE(result.out.empty()) << result.out;
+  const std::size_t begin = result.err.find("feeler: error: ");
+  ASSERT_NE(begin, std::string::npos) << result.err;
+  EXPECT_TRUE(begin == 0 || result.err[begin - 1] == '\n') << result.err;
+  const std::string line = result.err.substr(begin);
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << line;
+  EXPECT_NE(line.find(named), std::string::npos) << line;
+  EXPECT_TRUE(line.ends_with(")\n")) << "says not how to mend it: " << line;
 }
 
 }  // namespace feeler::cli

@@ -32,6 +32,10 @@ bool KillFeelerAfter(const std::vector<std::string>& arguments, double seconds);
 /// A new empty folder under the test's temporary folder.
 std::string ScratchFolder(const std::string& name);
 
+/// The law of bad input: exit code 2, nothing on standard output, and one line on standard error, last, that names
+/// `named` and ends with how to mend it, in brackets. Before it there may be what was noticed on the way.
+void ExpectOneError(const CommandResult& result, const std::string& named);
+
 std::string ReadFile(const std::string& path);
 void WriteFile(const std::string& path, const std::string& content);
 

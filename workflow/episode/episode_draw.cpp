@@ -77,6 +77,7 @@ WorldDraw DrawWorld(const Task& task, const EpisodeFaults& faults, double fricti
   if (faults.port_stiffness_n_m) {
     draw.physics.port_stiffness_n_m = value_of(*faults.port_stiffness_n_m, "port-stiffness", 1e3);
   }
+  if (faults.worn_m) draw.physics.worn_m = value_of(*faults.worn_m, "worn", 1e-3);
   if (faults.slip_m) {
     constexpr double kTurn_rad_m = 2.0 * std::numbers::pi / 180.0 / 1e-3;
     const double slip_m = value_of(*faults.slip_m, "slip", 1e-3);

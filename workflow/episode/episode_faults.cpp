@@ -61,6 +61,10 @@ void AddPortStiffness(EpisodeFaults& n, double least_n_mm, double most_n_mm) {
   SetOnce(n.port_stiffness_n_m, "port stiffness", 1e3 * least_n_mm, 1e3 * most_n_mm);
 }
 
+void AddWorn(EpisodeFaults& n, double least_mm, double most_mm) {
+  SetOnce(n.worn_m, "wear", 1e-3 * least_mm, 1e-3 * most_mm);
+}
+
 constexpr WorldNoise kWorldNoises[] = {
     {"outside", "the target stands 0.5 to 4 mm outside the box of hypotheses on one axis",
      [](EpisodeFaults& n) { AddOutside(n, 0.5, 4.0); }},
@@ -105,6 +109,8 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
      0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
     {"port-stiffness", "the target stands on springs of so many N/mm, gives way by up to 1 mm and may stay displaced",
      0.1, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
+    {"worn", "the lead-in of the target is larger by so many mm (negative: smaller)", -5.0, 5.0,
+     [](EpisodeFaults& n, double mm) { AddWorn(n, mm, mm); }},
 };
 
 /// Names with a range, "yaw=0..5": the value is drawn uniformly per episode.
@@ -121,7 +127,8 @@ constexpr DrawnNoise kDrawnNoises[] = {{"yaw", 0.0, 30.0, AddYaw},
                                        {"latency", 0.0, 50.0, AddLatency},
                                        {"contact-friction", 0.0, 5.0, AddContactFriction},
                                        {"slip", 0.0, 5.0, AddSlip},
-                                       {"port-stiffness", 0.1, 1e4, AddPortStiffness}};
+                                       {"port-stiffness", 0.1, 1e4, AddPortStiffness},
+                                       {"worn", -5.0, 5.0, AddWorn}};
 
 bool ReadNumber(const std::string& text, double& value) {
   std::istringstream number(text);
@@ -146,9 +153,10 @@ bool AddDrawn(const std::string& text, EpisodeFaults& noise) {
     drawn.add(noise, from, to);
     return true;
   }
-  throw InputError("noise", "'" + text + "': " + name + " takes no range",
-                   "yaw, outside, force-noise, latency, contact-friction, slip and port-stiffness take one, FROM..TO; "
-                   "give a number");
+  throw InputError(
+      "noise", "'" + text + "': " + name + " takes no range",
+      "yaw, outside, force-noise, latency, contact-friction, slip, port-stiffness and worn take one, FROM..TO; "
+      "give a number");
 }
 
 /// Takes "NAME=NUMBER" with a name of kMeasuredNoises; false for any other text.

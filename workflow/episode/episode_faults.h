@@ -37,6 +37,7 @@ struct EpisodeFaults {
   /// every mm, either way.
   std::optional<FaultRange> slip_m;
   std::optional<FaultRange> port_stiffness_n_m;  ///< of the springs that the target stands on
+  std::optional<FaultRange> worn_m;              ///< the lead-in is larger by this; negative: smaller
 };
 
 struct FaultName {

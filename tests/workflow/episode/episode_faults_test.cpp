@@ -125,7 +125,7 @@ TEST(DrawEpisode, RangesAreFilledAndKept) {
 TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
   const Task task = ThreeAxisTask();
   const EpisodeFaults faults =
-      ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6,port-stiffness=5..50");
+      ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6,port-stiffness=5..50,worn=-0.3..0.3");
   EXPECT_GE(faults.robot.contact_threshold_n, 40.0) << "a contact is told from the worst noise of the range";
   std::map<std::string, std::pair<double, double>> met;
   for (std::uint64_t k = 0; k < 200; ++k) {
@@ -135,6 +135,7 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
     EXPECT_EQ(draw.robot.force_noise_n, draw.values.at("force-noise"));
     EXPECT_NEAR(0.3 * draw.physics.contact_friction, draw.values.at("contact-friction"), 1e-12);
     EXPECT_NEAR(1e-3 * draw.physics.port_stiffness_n_m, draw.values.at("port-stiffness"), 1e-9);
+    EXPECT_NEAR(1e3 * draw.physics.worn_m, draw.values.at("worn"), 1e-12);
     EXPECT_NEAR(1e3 * draw.physics.tool_slip_m.norm(), draw.values.at("slip"), 1e-12);
     EXPECT_EQ(draw.physics.tool_slip_m[AxisOf(task.insertion)], 0.0);
     EXPECT_NEAR(std::abs(draw.physics.tool_turn_rad) * 180.0 / std::numbers::pi, 2.0 * draw.values.at("slip"), 1e-9);
@@ -149,7 +150,8 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
                                                                    {"contact-friction", {0.1, 0.6}},
                                                                    {"slip", {0.0, 1.0}},
                                                                    {"force-noise", {1.0, 6.0}},
-                                                                   {"port-stiffness", {5.0, 50.0}}};
+                                                                   {"port-stiffness", {5.0, 50.0}},
+                                                                   {"worn", {-0.3, 0.3}}};
   ASSERT_EQ(met.size(), ranges.size());
   for (const auto& [name, range] : ranges) {
     const double width = range.second - range.first;
