@@ -33,6 +33,9 @@ struct RobotOptions {
   ComputedTorqueGains tracking;
   FrictionObserver::Options friction_observer;
   double acceleration_m_s2 = 2.5;  ///< of straight motions: half of what transfers ask of the joints
+  /// Guarded motions take at least so long to their speed: one that begins at a wall pushes with the mass of the arm
+  /// times its acceleration.
+  double guarded_ramp_s = 0.02;
   double angular_speed_rad_s = 1.0;
   double angular_acceleration_rad_s2 = 5.0;
   double joint_speed_fraction = 0.5;       ///< of the joints' limits, in transfers
@@ -179,7 +182,7 @@ class SimulatedRobot : public Robot {
   using ReferenceAt = std::function<std::optional<JointReference>(double time_s)>;
   using TorqueAt = std::function<JointVector(double time_s)>;
 
-  PoseTrajectory Line(const Pose& goal, double speed_m_s) const;
+  PoseTrajectory Line(const Pose& goal, double speed_m_s, double acceleration_m_s2) const;
   /// Joint references along a trajectory; slows it to the joints' speed limits. Empty when a pose is out of reach.
   std::optional<PoseTrajectory> Reachable(const PoseTrajectory& trajectory) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);

@@ -11,10 +11,10 @@
 
 namespace feeler::env {
 
-PoseTrajectory SimulatedRobot::Line(const Pose& goal, double speed_m_s) const {
+PoseTrajectory SimulatedRobot::Line(const Pose& goal, double speed_m_s, double acceleration_m_s2) const {
   CartesianLimits limits;
   limits.speed_m_s = speed_m_s;
-  limits.acceleration_m_s2 = options_.acceleration_m_s2;
+  limits.acceleration_m_s2 = acceleration_m_s2;
   limits.angular_speed_rad_s = options_.angular_speed_rad_s;
   limits.angular_acceleration_rad_s2 = options_.angular_acceleration_rad_s2;
   return PoseTrajectory({ToolPose(), goal}, limits);
@@ -82,7 +82,8 @@ MotionResult SimulatedRobot::Guarded(const GuardedMotion& motion) {
     Watch watch;
     watch.tool_force_n = motion.contact_force_n;
     watch.direction = motion.direction;
-    MotionResult result = FollowLine(Line(goal, motion.speed_m_s), watch);
+    const double acceleration_m_s2 = std::min(options_.acceleration_m_s2, motion.speed_m_s / options_.guarded_ramp_s);
+    MotionResult result = FollowLine(Line(goal, motion.speed_m_s, acceleration_m_s2), watch);
     result.travelled_m = (result.world_T_tool.translation() - start.translation()).dot(motion.direction);
     return result;
   });
@@ -98,7 +99,7 @@ MotionResult SimulatedRobot::LinearMove(const Pose& world_T_tool, double speed_m
     Watch watch;
     watch.tool_force_n = contact_force_n;
     if (way.norm() > 1e-9) watch.direction = way.normalized();
-    MotionResult result = FollowLine(Line(world_T_tool, speed_m_s), watch);
+    MotionResult result = FollowLine(Line(world_T_tool, speed_m_s, options_.acceleration_m_s2), watch);
     result.travelled_m = (result.world_T_tool.translation() - start.translation()).dot(watch.direction);
     return result;
   });

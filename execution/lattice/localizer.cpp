@@ -146,6 +146,7 @@ void Localizer::Postpone(const GuardedMove& move) {
     // The motion starts at the station: an overtravel along another axis is taken back first.
     Eigen::Vector3d off = mover_.position() - Station();
     off[AxisOf(move.direction)] = 0.0;
+    if (lifted_) off[AxisOf(task_.insertion)] = 0.0;  // comes down on its way
     if (off.norm() > kSamePlace) {
       Eigen::Vector3d station = Station();
       station[AxisOf(move.direction)] = mover_.position()[AxisOf(move.direction)];
@@ -174,11 +175,13 @@ void Localizer::Flush() {
     ShiftOffEdge(touch);
   }
   pending_.reset();
+  lifted_ = false;
 }
 
 void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
   Prediction now = prediction;
   const double tolerance = mover_.options().matching.tolerance_cells;
+  lifted_ = false;
   while (true) {
     const Eigen::Vector3d begun = mover_.position();
     const Touch touch = ProbeAlong(move, now);
@@ -343,7 +346,9 @@ void Localizer::RetreatFromContact(Direction direction) {
   if (to_wall < room || (direction == task_.insertion && faces_known_)) {
     kept_offset_[axis] = SignOf(direction) * (to_wall - std::max(room, std::min(to_wall, kFaceMargin)));
   }
-  mover_.Retreat(Station());
+  // What it has met may be the lead-in of an opening, and the face beside it higher.
+  lifted_ = direction == task_.insertion && !faces_known_ && MayHaveFallenIn(task_, problem_, mover_.position());
+  mover_.Retreat(lifted_ ? Eigen::Vector3d(Station() - kRim * UnitVector(direction)) : Station());
 }
 
 void Localizer::FailOffTree(const Touch& touch) const {

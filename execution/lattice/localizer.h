@@ -86,8 +86,9 @@ class Localizer {
   std::vector<Touch> evidence_;
   Cell robot_;
   Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
-  bool face_felt_ = false;                                 ///< there was a contact along the insertion
-  bool faces_known_ = false;                               ///< the last one was where the one before it had put it
+  bool face_felt_ = false;    ///< there was a contact along the insertion
+  bool faces_known_ = false;  ///< the last one was where the one before it had put it
+  bool lifted_ = false;       ///< the tool stands kRim above Station(), off what may be a lead-in
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
   std::optional<Eigen::Vector3d> found_inside_;
   std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()

@@ -25,6 +25,7 @@ constexpr std::string_view kMagic = "FEELERAR";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kAlignment = 64;
 constexpr const char* kExtension = ".tables";
+constexpr const char* kPoolExtension = ".pool";
 
 std::size_t Aligned(std::size_t at) { return (at + kAlignment - 1) / kAlignment * kAlignment; }
 
@@ -103,6 +104,12 @@ std::unique_ptr<HostLock> ArrayStore::Lock(const CancellationToken* cancellation
   return HostLock::Acquire(file, [&] { return cancellation == nullptr || !cancellation->cancelled(); });
 }
 
+std::shared_ptr<SharedPool> ArrayStore::Pool(const std::string& name) const {
+  fs::path file = FileOf(name);
+  file.replace_extension(kPoolExtension);
+  return SharedPool::Open(file);
+}
+
 fs::path ArrayStore::FileOf(const std::string& name) const {
   const std::string whole = key_ + "/" + name;
   const XXH128_hash_t hash = XXH3_128bits(whole.data(), whole.size());
@@ -165,7 +172,7 @@ void ArrayStore::MakeRoom(std::uintmax_t bytes) const {
   std::vector<File> files;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
-    if (entry.path().extension() != kExtension) continue;
+    if (entry.path().extension() != kExtension && entry.path().extension() != kPoolExtension) continue;
     std::error_code gone;
     const File file{entry.last_write_time(gone), entry.path(), entry.file_size(gone)};
     if (gone) continue;

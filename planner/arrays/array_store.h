@@ -13,6 +13,7 @@
 #include "feeler/core/progress.h"
 #include "feeler/planner/arrays/host_lock.h"
 #include "feeler/planner/arrays/shared_array.h"
+#include "feeler/planner/arrays/shared_pool.h"
 
 namespace feeler::planner {
 
@@ -37,6 +38,9 @@ class ArrayStore {
   /// For whoever makes what the key stands for: another process that needs the same waits until it can take it. Null
   /// after a cancellation, or where there is no lock.
   std::unique_ptr<HostLock> Lock(const CancellationToken* cancellation) const;
+
+  /// For arrays that are made one by one while the processes run; null where there is none.
+  std::shared_ptr<SharedPool> Pool(const std::string& name) const;
 
   /// Fills the arrays from the file of this name; false, and nothing done, without one that has as many.
   template <class T>

@@ -16,7 +16,8 @@ class PlanningTables;
 /// with `jobs` threads, for hypotheses that span no more than those of `problem` (larger sets are cut).
 /// After a cancellation of `options` they are incomplete: nothing may be looked up in them (`Solve` does not).
 /// With a store (whatever its key) they are made once a host: the first process keeps them as files, the others map
-/// these. Tables of pairs, which are made when first asked for, stay each process' own.
+/// these. So are tables of pairs of turned hypotheses, which are made when first asked for (SharedPool); those of one
+/// orientation stay each process' own.
 std::shared_ptr<const PlanningTables> BuildPlanningTables(const Problem& problem, const SolverOptions& options,
                                                           Parallelism jobs = {}, const ArrayStore* store = nullptr);
 

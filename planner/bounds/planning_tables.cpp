@@ -79,7 +79,7 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
   const bool oriented = problem.map->orientations() > 1;
   if (oriented) {
     flags_ = std::make_shared<const StepFlagsGrid>(*problem.map, jobs, kept);
-    oriented_pairs_ = std::make_shared<OrientedPairs>(flags_, costs);
+    oriented_pairs_ = std::make_shared<OrientedPairs>(flags_, costs, kept != nullptr ? kept->Pool("pairs") : nullptr);
     if (options.heuristic == HeuristicKind::kCertificate || options.heuristic == HeuristicKind::kCuboids) {
       oriented_ = std::make_shared<OrientedCertificates>(problem, *flags_, costs, jobs, options.on_tables,
                                                          options.cancellation, kept);

@@ -10,8 +10,6 @@
 namespace feeler::cli {
 namespace {
 
-const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
-
 /// Words after `key:` at the start of a line.
 std::vector<std::string> WordsOf(const std::string& text, const std::string& key) {
   std::istringstream lines(text);

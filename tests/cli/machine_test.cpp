@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
-
 void LimitMemory(rlim_t bytes) {
   const rlimit limit{bytes, bytes};
   setrlimit(RLIMIT_AS, &limit);

@@ -14,10 +14,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* kFamily = "2..6x2..6x2..6";
+constexpr const char* kWholeFamily = "2..6x2..6x2..6";
 
 std::vector<std::string> Preprocess(const std::string& file, const std::string& jobs) {
-  return {"preprocess", "--task", "plug", "--out", file, "--family", kFamily, "--jobs", jobs};
+  return {"preprocess", "--task", "plug", "--out", file, "--family", kWholeFamily, "--jobs", jobs};
 }
 
 Json Info(const std::string& file) {

@@ -11,12 +11,12 @@
 namespace feeler::cli {
 namespace {
 
-const std::string kProblem = R"({"name": "slot", "size": [6,5,1], "start": [1,4,0], "tool": [[0,0,0]],
+const std::string kSlotText = R"({"name": "slot", "size": [6,5,1], "start": [1,4,0], "tool": [[0,0,0]],
  "target": [[0,0,0],[1,0,0],[2,0,0],[3,0,0],[0,1,0],[1,1,0],[3,1,0]], "hypotheses": [[0,0,0,1],[1,0,0,1],[1,1,0,1]],
  "move_lengths": [1,2,4]NOISE})";
 
 std::string Written(const std::string& folder, const std::string& noise) {
-  std::string text = kProblem;
+  std::string text = kSlotText;
   text.replace(text.find("NOISE"), 5, noise);
   const std::string file = folder + "/problem" + std::to_string(noise.size()) + ".json";
   WriteFile(file, text);

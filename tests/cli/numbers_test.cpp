@@ -10,8 +10,6 @@
 namespace feeler::cli {
 namespace {
 
-const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
-
 struct NumericOption {
   std::vector<std::string> command;
   std::string option;

@@ -24,8 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
-
 std::vector<std::string> SolveTo(const std::string& out) { return {"solve", "--problem", kProblem, "--out", out}; }
 
 void ExpectRefused(const CommandResult& result, const std::string& named) {

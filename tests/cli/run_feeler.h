@@ -6,6 +6,9 @@
 
 namespace feeler::cli {
 
+/// A lattice problem in two dimensions, small.
+inline const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
+
 struct CommandResult {
   int exit_code = -1;
   std::string out;

@@ -35,7 +35,7 @@ std::string Digest(const std::string& file) {
   return result.exit_code == 0 ? Json::parse(result.out).at("content_digest").get<std::string>() : "";
 }
 
-void Preprocess(const std::string& file, std::vector<std::string> more = {}) {
+void PreprocessInto(const std::string& file, std::vector<std::string> more = {}) {
   std::vector<std::string> arguments = {"preprocess", "--task", "plug",  "--family", kFamily,
                                         "--jobs",     "1",      "--out", file};
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -53,8 +53,8 @@ struct Parts {
 const Parts& Family() {
   static const Parts parts = [] {
     Parts made;
-    Preprocess(made.whole);
-    for (int i = 1; i <= 3; ++i) Preprocess(made.Shard(i), {"--shard", std::to_string(i) + "/3"});
+    PreprocessInto(made.whole);
+    for (int i = 1; i <= 3; ++i) PreprocessInto(made.Shard(i), {"--shard", std::to_string(i) + "/3"});
     return made;
   }();
   return parts;
@@ -121,10 +121,10 @@ TEST(Shards, AreRefusedForWhatIsWrongWithThem) {
   ExpectRefused(Merge({s1, s2, parts.folder + "/absent.db"}, out), "absent.db", out);
 
   const std::string other = parts.folder + "/other.db";
-  Preprocess(other, {"--shard", "2/3", "--gap", "1.5"});
+  PreprocessInto(other, {"--shard", "2/3", "--gap", "1.5"});
   ExpectRefused(Merge({s1, other, s3}, out), "another settings", out);
   const std::string four = parts.folder + "/four.db";
-  Preprocess(four, {"--shard", "2/4"});
+  PreprocessInto(four, {"--shard", "2/4"});
   ExpectRefused(Merge({s1, four, s3}, out), "is one of 4 shards", out);
 
   const std::string damaged = parts.folder + "/damaged.db";
@@ -162,7 +162,7 @@ TEST(Shards, DisjointFamiliesMergeAndOverlappingOnesDoNot) {
 }
 
 /// The lines of a records file without what is measured.
-std::vector<Json> Records(const std::string& file) {
+std::vector<Json> RecordsOf(const std::string& file) {
   std::vector<Json> records;
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
@@ -189,8 +189,8 @@ TEST(Shards, OfRecordsMergedAreTheWhole) {
   const std::string one = folder + "/1.jsonl", two = folder + "/2.jsonl", three = folder + "/3.jsonl";
   const CommandResult merged = Merge({three, one, two}, out, "records");
   ASSERT_EQ(merged.exit_code, 0) << merged.err;
-  EXPECT_EQ(Records(out), Records(folder + "/whole.jsonl"));
-  EXPECT_EQ(Records(out).size(), 7U);
+  EXPECT_EQ(RecordsOf(out), RecordsOf(folder + "/whole.jsonl"));
+  EXPECT_EQ(RecordsOf(out).size(), 7U);
 
   const std::string no = folder + "/no.jsonl";
   ExpectRefused(Merge({one, two}, no, "records"), "3 of 3 missing", no);
@@ -343,7 +343,7 @@ TEST_F(RanksTest, MakeTheSameRecords) {
   const CommandResult result =
       Mpirun(3, "run --task plug --db " + Family().whole + " --episodes 7 --out " + folder + "/ranks.jsonl");
   ASSERT_EQ(result.exit_code, 0) << result.out;
-  EXPECT_EQ(Records(folder + "/ranks.jsonl"), Records(folder + "/whole.jsonl"));
+  EXPECT_EQ(RecordsOf(folder + "/ranks.jsonl"), RecordsOf(folder + "/whole.jsonl"));
 }
 
 TEST_F(RanksTest, ALostRankLeavesAFileThatGoesOn) {

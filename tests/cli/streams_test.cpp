@@ -13,8 +13,6 @@
 namespace feeler::cli {
 namespace {
 
-const std::string kProblem = std::string(FEELER_SOURCE_DIR) + "/tests/data/slot2d.json";
-
 void Full(int descriptor) {
   const int full = open("/dev/full", O_WRONLY);
   dup2(full, descriptor);

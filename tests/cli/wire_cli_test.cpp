@@ -22,9 +22,9 @@
 namespace feeler::cli {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-const std::string& Database() {
+const std::string& CubeDatabase() {
   static const std::string path = [] {
     const std::string file = ScratchFolder("wire") + "/plug.db";
     const CommandResult made =
@@ -72,15 +72,15 @@ class Simulation {
   }
   const std::string& address() const { return address_; }
   /// What it says at its end; it is told to end where it would wait for more.
-  Json Stop() {
+  OrderedJson Stop() {
     kill(child_, SIGTERM);
     return Wait();
   }
-  Json Wait() {
+  OrderedJson Wait() {
     int status = 0;
     waitpid(child_, &status, 0);
     child_ = 0;
-    const Json seen = Json::parse(ReadFile(folder_ + "/out"), nullptr, false);
+    const OrderedJson seen = OrderedJson::parse(ReadFile(folder_ + "/out"), nullptr, false);
     EXPECT_FALSE(seen.is_discarded()) << ReadFile(folder_ + "/err");
     return seen;
   }
@@ -92,7 +92,7 @@ class Simulation {
 };
 
 std::vector<std::string> Execute(const std::string& address, const std::vector<std::string>& more) {
-  std::vector<std::string> arguments = {"execute", "--db", Database(), "--robot", address};
+  std::vector<std::string> arguments = {"execute", "--db", CubeDatabase(), "--robot", address};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -102,7 +102,7 @@ std::vector<std::string> Untimed(const std::string& path) {
   std::vector<std::string> lines;
   std::istringstream in(ReadFile(path));
   for (std::string line; std::getline(in, line);) {
-    Json record = Json::parse(line);
+    OrderedJson record = OrderedJson::parse(line);
     EXPECT_EQ(record.erase("timing"), 1U);
     lines.push_back(record.dump());
   }
@@ -114,7 +114,7 @@ TEST(WireCli, RecordsInLockstepAreThoseOfOneProcess) {
     const std::string folder = ScratchFolder("wire_records");
     const std::vector<std::string> episodes = {"--seed", "3", "--episodes", "3", "--noise", noise};
     std::vector<std::string> run = {
-        "run", "--task", "plug", "--db", Database(), "--extents", "4x4x4", "--out", folder + "/run.jsonl"};
+        "run", "--task", "plug", "--db", CubeDatabase(), "--extents", "4x4x4", "--out", folder + "/run.jsonl"};
     run.insert(run.end(), episodes.begin(), episodes.end());
     EXPECT_EQ(RunFeeler(run).exit_code, 0);
     Simulation simulation(episodes);
@@ -125,7 +125,7 @@ TEST(WireCli, RecordsInLockstepAreThoseOfOneProcess) {
     const std::vector<std::string> direct = Untimed(folder + "/run.jsonl");
     EXPECT_EQ(direct.size(), 3U);
     EXPECT_EQ(Untimed(folder + "/wire.jsonl"), direct) << noise;
-    const Json summary = Json::parse(executed.out);
+    const OrderedJson summary = OrderedJson::parse(executed.out);
     EXPECT_EQ(summary.at("episodes"), 3);
     EXPECT_EQ(summary.at("links_lost"), 0);
   }
@@ -146,13 +146,13 @@ TEST(WireCli, WhatGoesWrongIsTheReasonAndTheNextEpisodeIsSound) {
                          "drop=0.3,stall=0.3,protective=0.2,malformed=0.2,half=0.2,nan=0.1,backwards=0.1,jump=0.1"});
   const CommandResult executed = RunFeeler(Execute(simulation.address(), {"--out", out, "--json"}));
   EXPECT_EQ(executed.exit_code, 0) << executed.err;
-  const Json seen = simulation.Stop();
+  const OrderedJson seen = simulation.Stop();
   EXPECT_FALSE(seen.at("faults").empty());
   int inserted = 0;
   int broken = 0;
   std::istringstream in(ReadFile(out));
   for (std::string line; std::getline(in, line);) {
-    const Json record = Json::parse(line);
+    const OrderedJson record = OrderedJson::parse(line);
     const std::string reason = record.at("reason");
     EXPECT_EQ(record.at("forbidden_contacts"), 0) << reason;
     if (record.at("inserted").get<bool>()) {
@@ -220,7 +220,7 @@ TEST(WireCli, BadInputIsOneLine) {
   refused(Execute(nowhere, {"--estimate", "1,2,3,0.5,0,0,0"}), "quaternion");
   refused(Execute(nowhere, {"--box", "0,0,0,1,1,0"}), "--box");
   refused(Execute(nowhere, {"--task", "round-peg"}), "--task");
-  refused(Execute(nowhere, {"--cell", Database()}), "");
+  refused(Execute(nowhere, {"--cell", CubeDatabase()}), "");
   refused(Execute(nowhere, {"--token-file", "/nowhere"}), "/nowhere");
   refused({"execute", "--db", "/nowhere.db", "--robot", nowhere}, "/nowhere.db");
   refused({"simulate", "--task", "plug", "--listen", "0.0.0.0:0"}, "token");

@@ -6,10 +6,12 @@
 
 namespace feeler::planner {
 
-OrientedPairs::OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs)
+OrientedPairs::OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs,
+                             std::shared_ptr<SharedPool> pool)
     : flags_(std::move(flags)),
       unit_(costs.free),
-      contact_units_(static_cast<std::uint8_t>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)))) {}
+      contact_units_(static_cast<std::uint8_t>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)))),
+      pool_(std::move(pool)) {}
 
 std::shared_ptr<const OrientedPairs::Plane> OrientedPairs::Get(const Cell& offset, int orientation, int other) const {
   const std::array<int, 5> key = {offset.x(), offset.y(), offset.z(), orientation, other};
@@ -18,7 +20,7 @@ std::shared_ptr<const OrientedPairs::Plane> OrientedPairs::Get(const Cell& offse
     const auto at = planes_.find(key);
     if (at != planes_.end()) return at->second;
   }
-  auto fresh = std::make_shared<const Plane>(Build(offset, orientation, other));
+  auto fresh = std::make_shared<const Plane>(Make(offset, orientation, other));
   const std::lock_guard lock(mutex_);
   if (bytes_ + fresh->values.size() > kMostBytes) {
     planes_.clear();
@@ -29,17 +31,32 @@ std::shared_ptr<const OrientedPairs::Plane> OrientedPairs::Get(const Cell& offse
   return at->second;
 }
 
-OrientedPairs::Plane OrientedPairs::Build(const Cell& offset, int orientation, int other) const {
+OrientedPairs::Plane OrientedPairs::Make(const Cell& offset, int orientation, int other) const {
   Plane plane;
   plane.box = OrientedBox(StepFlagsGrid::Union(flags_->region(orientation), flags_->region(other)), offset.cwiseAbs());
-  const OrientedBox& box = plane.box;
-  plane.values.assign(box.cells, OrientedCertificates::kNone);
+  const SharedPool::Key key = {offset.x(), offset.y(), offset.z(), orientation, other};
+  if (pool_) {
+    if (const auto there = pool_->Find(key); there.size() == plane.box.cells) {
+      plane.values = SharedArray<std::uint8_t>(there, pool_);
+      return plane;
+    }
+  }
+  std::vector<std::uint8_t> made = Build(plane.box, offset, orientation, other);
+  const auto kept = pool_ && !made.empty() ? pool_->Keep(key, made) : std::span<const std::uint8_t>();
+  plane.values =
+      kept.size() == made.size() ? SharedArray<std::uint8_t>(kept, pool_) : SharedArray<std::uint8_t>(std::move(made));
+  return plane;
+}
+
+std::vector<std::uint8_t> OrientedPairs::Build(const OrientedBox& box, const Cell& offset, int orientation,
+                                               int other) const {
+  std::vector<std::uint8_t> values(box.cells, OrientedCertificates::kNone);
   std::vector<std::uint8_t> mine(box.cells);
   std::array<std::vector<std::uint32_t>, OrientedCertificates::kMost + 1> queues;  // by cost
   const auto reach = [&](std::size_t cell, unsigned cost) {
     const auto value = static_cast<std::uint8_t>(std::min<unsigned>(cost, OrientedCertificates::kMost));
-    if (value >= plane.values[cell]) return;
-    plane.values[cell] = value;
+    if (value >= values[cell]) return;
+    values[cell] = value;
     queues[value].push_back(static_cast<std::uint32_t>(cell));
   };
   constexpr unsigned kBlockedSteps = (1U << kDirectionCount) - 1;
@@ -63,7 +80,7 @@ OrientedPairs::Plane OrientedPairs::Build(const Cell& offset, int orientation, i
   for (unsigned cost = 0; cost < queues.size(); ++cost) {
     for (std::size_t k = 0; k < queues[cost].size(); ++k) {
       const std::size_t to = queues[cost][k];
-      if (plane.values[to] != cost) continue;
+      if (values[to] != cost) continue;
       const auto c = static_cast<int>(to);
       const Cell at(c % box.size.x(), c / box.size.x() % box.size.y(), c / box.size.x() / box.size.y());
       for (const Direction d : kDirections) {
@@ -76,7 +93,7 @@ OrientedPairs::Plane OrientedPairs::Build(const Cell& offset, int orientation, i
       }
     }
   }
-  return plane;
+  return values;
 }
 
 std::size_t OrientedPairs::bytes() const {

@@ -8,6 +8,8 @@
 #include <mutex>
 #include <vector>
 
+#include "feeler/planner/arrays/shared_array.h"
+#include "feeler/planner/arrays/shared_pool.h"
 #include "feeler/planner/bounds/orientations/oriented_certificates.h"
 #include "feeler/planner/contact/step_flags_grid.h"
 
@@ -15,18 +17,20 @@ namespace feeler::planner {
 
 /// For two hypotheses, (h, o) and (h + offset, other): the least cost of a walk, as the tool fares under the first,
 /// that tells them apart; in the bytes of OrientedCertificates. A table per pair, built when first asked for and kept
-/// for others until all kept together exceed kMostBytes; who holds one holds it for good. Safe to use from many
-/// threads.
+/// for others until all kept together exceed kMostBytes; who holds one holds it for good. With a pool each is made once
+/// a host, as long as the pool has room. Safe to use from many threads.
 class OrientedPairs {
  public:
   static constexpr std::size_t kMostBytes = std::size_t{1} << 30;
 
   struct Plane {
     OrientedBox box;
-    std::vector<std::uint8_t> values;
+    SharedArray<std::uint8_t> values;
   };
 
-  OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs);
+  /// `pool`: that of the tables with these flags and costs; null: none.
+  OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs,
+                std::shared_ptr<SharedPool> pool = nullptr);
 
   /// Cost in problem units of a unit of the tables.
   double unit() const { return unit_; }
@@ -35,11 +39,13 @@ class OrientedPairs {
   std::size_t bytes() const;
 
  private:
-  Plane Build(const Cell& offset, int orientation, int other) const;
+  Plane Make(const Cell& offset, int orientation, int other) const;
+  std::vector<std::uint8_t> Build(const OrientedBox& box, const Cell& offset, int orientation, int other) const;
 
   std::shared_ptr<const StepFlagsGrid> flags_;
   double unit_;
   std::uint8_t contact_units_ = 0;
+  std::shared_ptr<SharedPool> pool_;
   mutable std::mutex mutex_;
   mutable std::map<std::array<int, 5>, std::shared_ptr<const Plane>> planes_;
   mutable std::size_t bytes_ = 0;  ///< of planes_

@@ -1,7 +1,8 @@
 // Laws of a guarded move. It stops at the wall: within v * dt (0.05 mm at 50 mm/s) of where the geometry says, from
 // any start and in any direction; in free space it ends where it was told and reports no contact; it agrees with the
 // kinematic outcome (the tool slid along the line until it overlaps) except within 0.1 mm of a tie. A retreat from a
-// contact does not stop at once, a push into it does.
+// contact does not stop at once, a push into it does. One that begins at its wall, or nearly, pushes no harder than one
+// that comes from afar.
 
 #include <gtest/gtest.h>
 
@@ -72,6 +73,24 @@ TEST_P(GuardedMoveTest, StopsAtTheWall) {
     EXPECT_TRUE(again.contact);
     EXPECT_NEAR(again.travelled_m, 0.001, 2e-4);
     EXPECT_TRUE(Move(a.direction, 0.005).contact);
+  }
+}
+
+TEST_P(GuardedMoveTest, OneThatBeginsAtItsWallPushesNoHarder) {
+  GuardedMotion motion;
+  motion.direction = -(target_.linear() * Eigen::Vector3d::UnitZ());
+  motion.distance_m = 0.008;
+  motion.speed_m_s = 0.0099;  // what 25 N allow along the insertion
+  motion.contact_force_n = noise_.contact_threshold_n;
+  const auto peak_n = [&](double above_m) {
+    Place({0.02, 0.02, above_m});
+    const MotionResult result = robot_.Guarded(motion);
+    EXPECT_TRUE(result.contact) << above_m;
+    return result.peak_force_n;
+  };
+  const double afar_n = peak_n(0.004);
+  for (const double above_m : {0.0, 1e-5, 2e-5, 4e-5, 7e-5, 1e-4, 2e-4, 5e-4}) {
+    EXPECT_LE(peak_n(above_m), 1.1 * afar_n) << above_m;
   }
 }
 
