@@ -35,7 +35,7 @@ struct RobotOptions {
   double acceleration_m_s2 = 2.5;  ///< of straight motions: half of what transfers ask of the joints
   /// Guarded motions take at least so long to their speed: one that begins at a wall pushes with the mass of the arm
   /// times its acceleration.
-  double guarded_ramp_s = 0.02;
+  double guarded_ramp_s = 0.05;
   double angular_speed_rad_s = 1.0;
   double angular_acceleration_rad_s2 = 5.0;
   double joint_speed_fraction = 0.5;       ///< of the joints' limits, in transfers

@@ -97,11 +97,15 @@ Eigen::Vector3d WearMesh(const Scene& scene, int geom, const Mouth& mouth, doubl
     moved = moved.cwiseMax(out.cwiseAbs());
   }
   double reach = 0.0;
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();
   for (int v = first; v < first + model.mesh_vertnum[mesh]; ++v) {
-    reach = std::max(reach, Eigen::Map<const Eigen::Vector3f>(model.mesh_vert + 3 * v).cast<double>().norm());
+    const Eigen::Vector3d vertex = Eigen::Map<const Eigen::Vector3f>(model.mesh_vert + 3 * v).cast<double>();
+    reach = std::max(reach, vertex.norm());
+    half = half.cwiseMax(vertex.cwiseAbs());
   }
   for (int other = 0; other < model.ngeom; ++other) {
     if (model.geom_type[other] != mjGEOM_MESH || model.geom_dataid[other] != mesh) continue;
+    Eigen::Map<Eigen::Vector3d>(model.geom_size + 3 * other) = half;
     model.geom_rbound[other] = std::max(model.geom_rbound[other], reach + 1e-9);
   }
   return moved;
