@@ -8,6 +8,7 @@
 
 #include "feeler/core/lattice.h"
 #include "feeler/core/robot.h"
+#include "feeler/planner/belief/noise.h"
 #include "feeler/planner/belief/problem.h"
 
 namespace feeler::policies {
@@ -53,6 +54,13 @@ struct GiveUp {
 /// What to do next. Executors visit every alternative.
 using Decision = std::variant<GuardedMove, Insert, GiveUp, SpiralSearch, Servo>;
 
+/// What a policy that reckons with wrong readings asks of its executor: to weigh hypotheses by how likely they make a
+/// reading, where it would else drop those that the reading contradicts.
+struct Doubt {
+  planner::Noise noise;     ///< of single steps
+  double confidence = 0.0;  ///< of what the policy declares when it inserts
+};
+
 /// Decides the next action from what has been felt so far. One object serves many episodes, one after the other:
 /// `Begin` erases the past. Not thread-safe: one object per thread. The caller accounts the CPU time of the calls as
 /// planning time.
@@ -76,6 +84,9 @@ class Policy {
   /// Whether Next looks at the hypotheses of the belief. Those who carry out a policy that does not hand it none of
   /// them: no belief is copied for nobody.
   virtual bool reads_hypotheses() const { return true; }
+
+  /// Null (most policies): readings are taken at their word.
+  virtual const Doubt* doubt() const { return nullptr; }
 
   /// Tells the outcome, in lattice terms, that the executor settled on for the move last returned by Next. False when
   /// the policy holds no plan for that outcome; it is then as before the call and may be told another outcome.

@@ -16,7 +16,7 @@ void NoiseOptions::Validate() const {
         std::pair{"torque_noise_nm", torque_noise_nm}, std::pair{"force_bias_n", force_bias_n},
         std::pair{"force_delay_s", force_delay_s}, std::pair{"force_quantum_n", force_quantum_n},
         std::pair{"encoder_noise_rad", encoder_noise_rad}, std::pair{"encoder_jitter_rad", encoder_jitter_rad},
-        std::pair{"joint_stiffness_nm_rad", joint_stiffness_nm_rad},
+        std::pair{"false_stops_per_m", false_stops_per_m}, std::pair{"joint_stiffness_nm_rad", joint_stiffness_nm_rad},
         std::pair{"contact_threshold_n", contact_threshold_n}}) {
     if (!(value >= 0) || !std::isfinite(value)) {
       throw InputError("noise " + name, fmt::format("{} is {}", field, value), "give a finite number, zero or more");

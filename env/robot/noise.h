@@ -21,6 +21,9 @@ struct NoiseOptions {
   /// Mass of the held tool that gravity and acceleration compensation does not know of (negative: counts too much). Its
   /// weight and inertia stay in the readings; zeroing the wrench removes the weight.
   double payload_error_kg = 0.0;
+  /// Expected false contacts per metre of guarded and linear motion that is watched for contact: the motion ends there
+  /// with a contact that is none.
+  double false_stops_per_m = 0.0;
   double encoder_noise_rad = 0.0;   ///< standard deviation of a constant offset per joint, drawn once an episode
   double encoder_jitter_rad = 0.0;  ///< standard deviation of each reading
   /// Stiffness of each joint between encoder and link, 0: rigid. The tool gives way under contact and the encoders do

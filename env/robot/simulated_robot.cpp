@@ -23,7 +23,8 @@ SimulatedRobot::SimulatedRobot(std::shared_ptr<const Scene> scene, const RobotOp
               .sensor = ContactSensor(world_.scene(), {}, Nobody()),
               .friction = FrictionObserver(options.friction_observer),
               .encoder_random = Nobody(),
-              .image_random = Nobody()} {
+              .image_random = Nobody(),
+              .false_stop_random = Nobody()} {
   Reset(world_.scene().home_q_rad, world_.scene().task.world_T_target, {}, Nobody());
 }
 
@@ -51,6 +52,7 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
                         .transfer_seed = transfer_seed,
                         .encoder_random = RandomStream(sensor_seed, 0, "encoder"),
                         .image_random = RandomStream(sensor_seed, 0, "image"),
+                        .false_stop_random = RandomStream(sensor_seed, 0, "false stops"),
                         .encoder_offset = encoder_offset};
   Sense();
   memory_.tool_at_sensing = ToolPose();

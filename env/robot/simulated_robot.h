@@ -81,6 +81,7 @@ struct RobotMemory {
   std::uint64_t transfer_seed = 0;
   RandomStream encoder_random;
   RandomStream image_random;
+  RandomStream false_stop_random;
   JointVector encoder_offset = JointVector::Zero();
   JointVector deflection = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
   JointVector measured_q = JointVector::Zero();
@@ -186,6 +187,8 @@ class SimulatedRobot : public Robot {
   /// Joint references along a trajectory; slows it to the joints' speed limits. Empty when a pose is out of reach.
   std::optional<PoseTrajectory> Reachable(const PoseTrajectory& trajectory) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);
+  /// A straight motion to `goal` that false contacts end, where the noise has such.
+  MotionResult WatchedLine(const Pose& goal, double speed_m_s, double acceleration_m_s2, const Watch& watch);
   MotionResult Follow(double duration_s, const ReferenceAt& reference_at, const Watch& watch, bool settle);
   /// Integrates a tool twist for one step, slower where the joints do not allow it. Empty: no way on.
   std::optional<JointReference> Advance(const Vector6& wanted, TwistReference& reference, JointVector& q) const;

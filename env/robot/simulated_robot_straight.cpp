@@ -1,6 +1,7 @@
 // Straight motions in space: guarded and linear moves, by joint references at every physics step.
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -35,6 +36,28 @@ std::optional<PoseTrajectory> SimulatedRobot::Reachable(const PoseTrajectory& tr
     slowness = std::max(slowness, speed.cwiseAbs().cwiseQuotient(scene.velocity_limit_rad_s).maxCoeff());
   }
   return slowness > 1.0 ? trajectory.Slowed(slowness) : trajectory;
+}
+
+MotionResult SimulatedRobot::WatchedLine(const Pose& goal, double speed_m_s, double acceleration_m_s2,
+                                         const Watch& watch) {
+  constexpr double kUnwatched_n = 1e5;  // a contact force that no motion reaches: the way off a wall
+  const double rate = memory_.noise.false_stops_per_m;
+  if (!(rate > 0.0) || watch.tool_force_n >= kUnwatched_n)
+    return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
+  const Pose start = ToolPose();
+  const double length_m = (goal.translation() - start.translation()).norm();
+  const double until_false_m = -std::log(1.0 - memory_.false_stop_random.Uniform()) / rate;
+  if (until_false_m >= length_m) return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
+  const double share = until_false_m / length_m;
+  Pose stop = goal;
+  stop.translation() = start.translation() + share * (goal.translation() - start.translation());
+  stop.linear() = Eigen::Quaterniond(start.linear()).slerp(share, Eigen::Quaterniond(goal.linear())).toRotationMatrix();
+  MotionResult result = FollowLine(Line(stop, speed_m_s, acceleration_m_s2), watch);
+  if (result.reason == StopReason::kReached) {
+    result.reason = StopReason::kContact;
+    result.contact = true;
+  }
+  return result;
 }
 
 MotionResult SimulatedRobot::FollowLine(const PoseTrajectory& wanted, const Watch& watch) {
@@ -83,7 +106,7 @@ MotionResult SimulatedRobot::Guarded(const GuardedMotion& motion) {
     watch.tool_force_n = motion.contact_force_n;
     watch.direction = motion.direction;
     const double acceleration_m_s2 = std::min(options_.acceleration_m_s2, motion.speed_m_s / options_.guarded_ramp_s);
-    MotionResult result = FollowLine(Line(goal, motion.speed_m_s, acceleration_m_s2), watch);
+    MotionResult result = WatchedLine(goal, motion.speed_m_s, acceleration_m_s2, watch);
     result.travelled_m = (result.world_T_tool.translation() - start.translation()).dot(motion.direction);
     return result;
   });
@@ -99,7 +122,7 @@ MotionResult SimulatedRobot::LinearMove(const Pose& world_T_tool, double speed_m
     Watch watch;
     watch.tool_force_n = contact_force_n;
     if (way.norm() > 1e-9) watch.direction = way.normalized();
-    MotionResult result = FollowLine(Line(world_T_tool, speed_m_s, options_.acceleration_m_s2), watch);
+    MotionResult result = WatchedLine(world_T_tool, speed_m_s, options_.acceleration_m_s2, watch);
     result.travelled_m = (result.world_T_tool.translation() - start.translation()).dot(watch.direction);
     return result;
   });

@@ -103,6 +103,25 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
 
 MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted,
                          FreeBy free_by) {
+  constexpr int kMostFalse = 5;
+  constexpr double kSamePlace = 0.3;
+  constexpr double kComeOff = 0.5;
+  const bool careful = record_.careful;
+  const Eigen::Vector3d from = position_;
+  MotionReport report = FastOnce(target, kind, predicted, free_by);
+  for (int i = 0; doubts_ && report.contact && i < kMostFalse; ++i) {
+    const Eigen::Vector3d place = report.end;
+    const Eigen::Vector3d gone = place - from;
+    Retreat(gone.norm() > kComeOff ? Eigen::Vector3d(place - kComeOff * gone.normalized()) : from);
+    report = FastOnce(target, kind, {}, free_by);
+    if (report.contact && (report.end - place).norm() < kSamePlace) return report;
+  }
+  if (!report.contact) record_.careful = careful;
+  return report;
+}
+
+MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted,
+                             FreeBy free_by) {
   CheckLimits();
   const Eigen::Vector3d way = target - position_;
   double speed_m_s = options_.transfer_speed_m_s;

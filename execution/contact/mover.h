@@ -65,6 +65,9 @@ class Mover {
   const ExecutorOptions& options() const { return options_; }
   double Cells(double metres) const { return metres / frame_.cell_m; }
 
+  /// From now on a contact of a fast motion is believed when it comes again at the same place.
+  void DoubtContacts() { doubts_ = true; }
+
   /// Fast and straight to `target`, watched for contact.
   MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {},
                     FreeBy free_by = FreeBy::kBelief);
@@ -90,6 +93,8 @@ class Mover {
   void ZeroWrench() { robot_.ZeroWrench(); }
 
  private:
+  MotionReport FastOnce(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted,
+                        FreeBy free_by);
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
   /// The speed of a probe along `direction` (unit vector, world axes) that keeps the budget at whatever it may meet.
   double SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face, const MayMeet& may_meet) const;
@@ -110,6 +115,7 @@ class Mover {
   double start_time_s_;
   double last_motion_end_s_;
   Eigen::Vector3d position_;
+  bool doubts_ = false;
 };
 
 /// The axis direction nearest to `motion` if it is along an axis but for 10 % of its length.

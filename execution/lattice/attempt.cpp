@@ -187,6 +187,7 @@ Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, cons
   attempt.frame = FrameOf(episode.task, problem, world_T_estimate);
   attempt.possible = PossibleRegion(problem);
   Mover mover(episode.robot, attempt.frame, episode.options, episode.record, episode.started_s);
+  if (policy.doubt() != nullptr) mover.DoubtContacts();
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();
   const double off = (mover.position() - start).cwiseAbs().maxCoeff();
   if (off > 0.5) {

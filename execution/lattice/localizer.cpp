@@ -47,10 +47,17 @@ Touch MakeTouch(Direction direction, double from, const MotionReport& report) {
 
 Localizer::Localizer(const Task& task, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
                      ExecutionRecord& record)
-    : task_(task), problem_(problem), policy_(policy), mover_(mover), record_(record), robot_(problem.start) {
+    : task_(task),
+      problem_(problem),
+      policy_(policy),
+      mover_(mover),
+      record_(record),
+      robot_(problem.start),
+      doubt_(policy.doubt()) {
   for (const planner::Hypothesis& hypothesis : problem.hypotheses) {
     tracked_.push_back({hypothesis, Eigen::Vector3d::Zero()});
   }
+  if (doubt_ != nullptr) noise_.emplace(doubt_->noise);
 }
 
 policies::Belief Localizer::View() const {
@@ -80,9 +87,15 @@ policies::Decision Localizer::Run() {
     if (const auto* give_up = std::get_if<policies::GiveUp>(&decision)) {
       throw LostTrack("policy gave up: " + give_up->reason);
     }
-    if (!std::holds_alternative<GuardedMove>(decision)) return decision;
+    if (!std::holds_alternative<GuardedMove>(decision)) {
+      SettleDoubt();
+      return decision;
+    }
     // Readings are finer than outcomes: they may tell before the policy does.
-    if (tracked_.size() == 1) return policies::Insert{};
+    if (tracked_.size() == 1) {
+      SettleDoubt();
+      return policies::Insert{};
+    }
     const GuardedMove move = std::get<GuardedMove>(decision);
     if (move.cells < 1 || move.cells > 100000) {
       throw ExecutionFailure(fmt::format("policy: a guarded move of {} cells", move.cells));
@@ -199,6 +212,10 @@ void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
       mover_.Retreat(Station());
       return;
     }
+    if (TakeForFalse(move, touch)) {
+      mover_.Retreat(Station());
+      return;
+    }
     mover_.Retreat(begun);  // to where it began, for the other side of the edge
     ShiftOffEdge(touch);
     now = Predict(move);
@@ -270,25 +287,61 @@ bool Localizer::TakeOver(const GuardedMove& move, const Touch& touch, double tol
   const MatchOptions matching{tolerance_cells};
   const std::vector<OutcomeMatch> matches = MatchOutcomes(*problem_.map, tracked_, robot_, move, touch, matching);
   for (const OutcomeMatch& match : matches) {
-    if (!Tell(match.outcome)) continue;
+    if (Accept(move, touch, match.outcome, matching, match.best)) return true;
+  }
+  if (!matches.empty() && doubt_ == nullptr)
+    throw LostTrack("policy: no branch for any outcome that explains the reading");
+  return false;
+}
+
+bool Localizer::Accept(const GuardedMove& move, const Touch& touch, const Outcome& outcome,
+                       const MatchOptions& matching, std::optional<std::size_t> best) {
+  const int axis = AxisOf(touch.direction);
+  const int outcomes = CountOutcomes(move);
+  if (doubt_ != nullptr) {
+    std::vector<TrackedHypothesis> weighed = tracked_;
+    if (!Weigh(*problem_.map, robot_, move, touch, outcome, matching, *noise_, weighed) || !Tell(outcome)) return false;
+    tracked_ = std::move(weighed);
+    // The lattice is tied to the hypothesis that is believed now.
+    if (touch.contact) anchor_[axis] = tracked_[Likeliest(tracked_)].anchor[axis];
+  } else {
+    if (!Tell(outcome)) return false;
     if (touch.contact) {
-      const TrackedHypothesis& best = tracked_[match.best];
-      const int axis = AxisOf(touch.direction);
-      const double travel = PredictTravel(*problem_.map, best, touch.start, touch.direction);
+      const TrackedHypothesis& explains = tracked_[best.value()];
+      const double travel = PredictTravel(*problem_.map, explains, touch.start, touch.direction);
       if (touch.direction == task_.insertion) {
         faces_known_ = face_felt_ && std::abs(touch.travelled - travel) < kAgree;
         face_felt_ = true;
       }
-      anchor_[axis] = best.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
+      anchor_[axis] = explains.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
-    const int outcomes = CountOutcomes(move);
-    Settle(*problem_.map, robot_, move, touch, match.outcome, matching, tracked_);
-    LogDecision(move, match.outcome, outcomes);
-    robot_ += match.outcome.cells * UnitCell(move.direction);
-    return true;
+    Settle(*problem_.map, robot_, move, touch, outcome, matching, tracked_);
   }
-  if (!matches.empty()) throw LostTrack("policy: no branch for any outcome that explains the reading");
-  return false;
+  LogDecision(move, outcome, outcomes);
+  robot_ += outcome.cells * UnitCell(move.direction);
+  return true;
+}
+
+bool Localizer::TakeForFalse(const GuardedMove& move, const Touch& touch) {
+  if (doubt_ == nullptr || !touch.contact || !(doubt_->noise.false_stop > 0.0)) return false;
+  constexpr double kAgain = 0.3;
+  const bool again = false_contact_ && false_contact_->direction == touch.direction &&
+                     (false_contact_->end() - touch.end()).norm() < kAgain;
+  false_contact_ = touch;
+  if (again) return false;
+  const int axis = AxisOf(touch.direction);
+  const double from_station = SignOf(touch.direction) * (touch.end()[axis] - Station()[axis]);
+  return Accept(move, touch, OutcomeAsRead(move, from_station, true), mover_.options().matching, std::nullopt);
+}
+
+void Localizer::SettleDoubt() {
+  if (doubt_ == nullptr) return;
+  KeepLikely(doubt_->confidence, tracked_);
+  const TrackedHypothesis& believed = tracked_[Likeliest(tracked_)];
+  std::erase_if(evidence_, [&](const Touch& touch) {
+    return touch.contact && !touch.is_oblique() &&
+           Mismatch(*problem_.map, believed, touch) > mover_.options().matching.tolerance_cells;
+  });
 }
 
 int Localizer::CountOutcomes(const GuardedMove& move) const {

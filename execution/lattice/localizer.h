@@ -19,6 +19,10 @@ namespace feeler::execution {
 /// The lattice of the policy is tied to the world by an anchor. A contact tells where between two lattice points a wall
 /// stands; the lattice is shifted along that axis so that the wall stands where the hypothesis says (mid-cell), and
 /// later decisions along the axis are no longer near a tie.
+///
+/// With a policy that doubts its readings (Policy::doubt) hypotheses are weighed, not dropped: a contact that none
+/// explains is taken for a false one, and when the policy inserts the likeliest are left, those that together have the
+/// probability that it asks for. A false contact that comes again at the same place is no longer believed to be one.
 class Localizer {
  public:
   /// All arguments outlive the localizer. The tool stands at the start cell of the problem.
@@ -66,6 +70,15 @@ class Localizer {
   /// Tells the policy the outcome that explains the touch best and takes it over. False: nothing explains it within
   /// the tolerance (cells).
   bool TakeOver(const GuardedMove& move, const Touch& touch, double tolerance_cells);
+  /// Tells the policy the outcome, takes it over and writes it down; `best`: the hypothesis that explains it, if one
+  /// does. False, and nothing has happened, if the policy has no plan for it or no hypothesis allows it.
+  bool Accept(const GuardedMove& move, const Touch& touch, const Outcome& outcome, const MatchOptions& matching,
+              std::optional<std::size_t> best);
+  /// With doubt: takes a contact that nothing explains for a false one. False: it came again at the same place, or no
+  /// hypothesis allows that.
+  bool TakeForFalse(const GuardedMove& move, const Touch& touch);
+  /// With doubt, at the end: the likeliest hypotheses are left, and the touches that the likeliest explains.
+  void SettleDoubt();
   /// Writes the answer to a move of the policy into the record. `outcomes`: that could have been.
   void LogDecision(const GuardedMove& move, const Outcome& outcome, int outcomes);
   /// Different outcomes of a move under the hypotheses left.
@@ -92,6 +105,9 @@ class Localizer {
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
   std::optional<Eigen::Vector3d> found_inside_;
   std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()
+  const policies::Doubt* doubt_;      ///< of the policy; null: none
+  std::optional<planner::NoisyMoves> noise_;
+  std::optional<Touch> false_contact_;  ///< the last one that was taken for such
 };
 
 }  // namespace feeler::execution

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include "feeler/execution/contact/continuous_travel.h"
 
@@ -56,6 +58,69 @@ void Settle(const planner::ContactMap& map, const Cell& robot, const GuardedMove
     const double residual = touch.travelled - travel;
     if (touch.contact || residual > 0.0) t.anchor += residual * UnitVector(touch.direction);
   }
+}
+
+bool Weigh(const planner::ContactMap& map, const Cell& robot, const GuardedMove& move, const Touch& touch,
+           const Outcome& outcome, const MatchOptions& options, planner::NoisyMoves& noise,
+           std::vector<TrackedHypothesis>& tracked) {
+  constexpr double kImpossible = 1e-9;
+  std::vector<double> weights;
+  double total = 0.0;
+  for (const TrackedHypothesis& t : tracked) {
+    const Outcome predicted = map.Predict(robot - t.hypothesis.offset, move, t.hypothesis.orientation);
+    const std::vector<planner::NoisyOutcome>& possible = noise.Of(move.cells, predicted.cells).outcomes;
+    const auto same = std::ranges::find(possible, outcome, &planner::NoisyOutcome::outcome);
+    weights.push_back(same == possible.end() ? 0.0 : t.hypothesis.weight * same->probability);
+    total += weights.back();
+  }
+  if (!(total > 0.0)) return false;
+  std::vector<TrackedHypothesis> left;
+  double kept = 0.0;
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    if (weights[i] < kImpossible * total) continue;
+    TrackedHypothesis t = tracked[i];
+    t.hypothesis.weight = weights[i];
+    kept += weights[i];
+    const Outcome predicted = map.Predict(robot - t.hypothesis.offset, move, t.hypothesis.orientation);
+    if (predicted == outcome && Mismatch(map, t, touch) <= options.tolerance_cells) {
+      const double residual = touch.travelled - PredictTravel(map, t, touch.start, touch.direction);
+      if (touch.contact || residual > 0.0) t.anchor += residual * UnitVector(touch.direction);
+    }
+    left.push_back(t);
+  }
+  for (TrackedHypothesis& t : left) t.hypothesis.weight /= kept;
+  tracked = std::move(left);
+  return true;
+}
+
+Outcome OutcomeAsRead(const GuardedMove& move, double travelled_cells, bool contact) {
+  constexpr double kTracking = 0.1;
+  const int cells = std::clamp(static_cast<int>(std::floor(travelled_cells + kTracking)), 0, move.cells);
+  return {cells, contact && cells < move.cells};
+}
+
+std::size_t Likeliest(const std::vector<TrackedHypothesis>& tracked) {
+  const auto most =
+      std::ranges::max_element(tracked, {}, [](const TrackedHypothesis& t) { return t.hypothesis.weight; });
+  return static_cast<std::size_t>(most - tracked.begin());
+}
+
+void KeepLikely(double confidence, std::vector<TrackedHypothesis>& tracked) {
+  std::vector<double> weights;
+  double total = 0.0;
+  for (const TrackedHypothesis& t : tracked) {
+    weights.push_back(t.hypothesis.weight);
+    total += weights.back();
+  }
+  std::ranges::sort(weights, std::greater<>());
+  double sum = 0.0;
+  double least = 0.0;
+  for (const double weight : weights) {
+    least = weight;
+    sum += weight;
+    if (sum >= confidence * total) break;
+  }
+  std::erase_if(tracked, [&](const TrackedHypothesis& t) { return t.hypothesis.weight < least; });
 }
 
 namespace {

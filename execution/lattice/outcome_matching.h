@@ -8,6 +8,7 @@
 #include "feeler/execution/contact/contact_evidence.h"
 #include "feeler/execution/contact/executor_options.h"
 #include "feeler/planner/contact/contact_map.h"
+#include "feeler/planner/noise/noisy_outcomes.h"
 #include "feeler/policies/policy.h"
 
 namespace feeler::execution {
@@ -47,6 +48,24 @@ std::vector<OutcomeMatch> MatchOutcomes(const planner::ContactMap& map, const st
 /// along the axis of the touch so that it explains it exactly.
 void Settle(const planner::ContactMap& map, const Cell& robot, const GuardedMove& move, const Touch& touch,
             const Outcome& outcome, const MatchOptions& options, std::vector<TrackedHypothesis>& tracked);
+
+/// The same for readings that are wrong now and then: every hypothesis is weighed by the probability with which it
+/// makes the outcome of the move (planner/noise), those explained by the reading are shifted as above, and those below
+/// a share of 1e-9 are dropped. Weights sum to 1 afterwards. False, and nothing is changed, if no hypothesis allows the
+/// outcome.
+bool Weigh(const planner::ContactMap& map, const Cell& robot, const GuardedMove& move, const Touch& touch,
+           const Outcome& outcome, const MatchOptions& options, planner::NoisyMoves& noise,
+           std::vector<TrackedHypothesis>& tracked);
+
+/// The outcome of a reading taken at its word, whatever the hypotheses say: cells travelled from the lattice point of
+/// the robot cell, and contact unless it came behind the end of the move.
+Outcome OutcomeAsRead(const GuardedMove& move, double travelled_cells, bool contact);
+
+/// Index of the likeliest hypothesis (of equally likely ones the first).
+std::size_t Likeliest(const std::vector<TrackedHypothesis>& tracked);
+
+/// Keeps the likeliest hypotheses that together have probability `confidence`, in their order.
+void KeepLikely(double confidence, std::vector<TrackedHypothesis>& tracked);
 
 /// A small shift of the target across the touch that explains a reading which is off the tree: an edge met (or missed)
 /// because the truth lies at the rim of its cell, or else a wall close beside that the tool scraped along. In cells;

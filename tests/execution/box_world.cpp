@@ -146,6 +146,18 @@ bool KinematicRobot::InOpening(const Eigen::Vector3d& at) const {
 Pose KinematicRobot::ToolPose() const { return world_T_tool_; }
 
 MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched) {
+  if (!watched || !(faults_.false_stops_per_m > 0.0)) return Travel(to_world_m, speed_m_s, watched);
+  const Eigen::Vector3d from = world_T_tool_.translation();
+  const double length = (to_world_m - from).norm();
+  const double until = -std::log(1.0 - random_.Uniform()) / faults_.false_stops_per_m;
+  if (until >= length) return Travel(to_world_m, speed_m_s, watched);
+  MotionResult result = Travel(from + until / length * (to_world_m - from), speed_m_s, watched);
+  result.contact = true;
+  result.reason = StopReason::kContact;
+  return result;
+}
+
+MotionResult KinematicRobot::Travel(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched) {
   const Eigen::Vector3d from = world_T_tool_.translation();
   const Eigen::Vector3d motion = to_world_m - from;
   const double length = motion.norm();

@@ -45,6 +45,8 @@ struct RobotFaults {
   /// Of the opening against the housing, in target axes: the model knows nothing of it.
   double opening_offset_x_m = 0.0;
   double opening_yaw_rad = 0.0;
+  /// Watched motions end with a contact that is none, so many a metre, at places of an exponential law.
+  double false_stops_per_m = 0.0;
   int phantom_contacts = 0;  ///< so many guarded motions stop half way with a contact that is none
 };
 
@@ -69,6 +71,7 @@ class KinematicRobot : public Robot {
 
  private:
   MotionResult Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
+  MotionResult Travel(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
   Eigen::Vector3d Displacement(const Eigen::Vector3d& world_m) const;
   bool InOpening(const Eigen::Vector3d& displacement_m) const;
   /// Distance from the axis of the opening, the greater of both axes.

@@ -74,6 +74,7 @@ WorldDraw DrawWorld(const Task& task, const EpisodeFaults& faults, double fricti
   if (faults.contact_friction) {
     draw.physics.contact_friction = value_of(*faults.contact_friction, "contact-friction", 1.0) / friction;
   }
+  if (faults.false_stop > 0.0) draw.robot.false_stops_per_m = -std::log1p(-faults.false_stop) / task.cell_m;
   if (faults.port_stiffness_n_m) {
     draw.physics.port_stiffness_n_m = value_of(*faults.port_stiffness_n_m, "port-stiffness", 1e3);
   }

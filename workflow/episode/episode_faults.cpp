@@ -107,6 +107,8 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
      [](EpisodeFaults& n, double friction) { AddContactFriction(n, friction, friction); }},
     {"slip", "the tool has slipped in the gripper by so many mm across the insertion, and turned by 2 degrees a mm",
      0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
+    {"false-stop", "probability, a cell, that a motion watched for contact ends with a contact that is none", 0.0, 0.5,
+     [](EpisodeFaults& n, double probability) { n.false_stop = probability; }},
     {"port-stiffness", "the target stands on springs of so many N/mm, gives way by up to 1 mm and may stay displaced",
      0.1, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
     {"worn", "the lead-in of the target is larger by so many mm (negative: smaller)", -5.0, 5.0,

@@ -11,6 +11,7 @@
 #include "feeler/core/error.h"
 #include "feeler/env/contact/mesh_outcomes.h"
 #include "feeler/policies/database_policy.h"
+#include "feeler/policies/noisy_graph_policy.h"
 #include "feeler/policies/open_loop.h"
 #include "feeler/policies/spiral/hybrid_policy.h"
 #include "feeler/policies/touch/touch_based_localization.h"
@@ -70,6 +71,7 @@ struct Shared {
   PolicyOptions options;
   std::shared_ptr<planner::PlanningTablesCache> tables = std::make_shared<planner::PlanningTablesCache>(options.store);
   std::shared_ptr<VisualGoalOnce> visual_goal = std::make_shared<VisualGoalOnce>();
+  std::shared_ptr<NoisyPolicies> noisy = std::make_shared<NoisyPolicies>(options.noisy);
   std::shared_ptr<RegionCache> regions = std::make_shared<RegionCache>();
 };
 
@@ -95,6 +97,12 @@ PolicyPointer MakeDatabase(const PolicyRequest& request, const Shared& shared) {
 
 PolicyPointer MakeOnline(const PolicyRequest& /*request*/, const Shared& shared) {
   return std::make_unique<policies::OnlinePolicy>(shared.options.online, shared.tables);
+}
+
+PolicyPointer MakeNoisy(const PolicyRequest& request, const Shared& shared) {
+  const NoisyPolicyOptions& options = shared.noisy->options();
+  return std::make_unique<policies::NoisyGraphPolicy>(shared.noisy->For(request.problem, request.extents),
+                                                      policies::Doubt{options.noise, options.declaration.confidence});
 }
 
 PolicyPointer MakeOpenLoop(const PolicyRequest& /*request*/, const Shared& /*shared*/) {
@@ -173,6 +181,7 @@ PolicyPointer MakeVisualSift(const PolicyRequest& request, const Shared& shared)
 constexpr Entry kPolicies[] = {
     {"database", true, true, MakeDatabase},
     {"online", false, true, MakeOnline},
+    {"noisy", false, true, MakeNoisy},
     {"tbl", false, true, MakeTbl},
     {"tbl-mesh", false, true, MakeTblMesh},
     {"tbl-per-cost", false, true, MakeTblPerCost},
@@ -232,6 +241,12 @@ constexpr Setting kSettings[] = {
     {"tbl-actions", [](PolicyOptions& o, double v) { o.tbl_actions = static_cast<int>(v); }},
     {"online-seconds", [](PolicyOptions& o, double v) { o.online.time_limit_s = v; }},
     {"online-expansions", [](PolicyOptions& o, double v) { o.online.expansion_limit = static_cast<std::int64_t>(v); }},
+    {"missed-contact", [](PolicyOptions& o, double v) { o.noisy.noise.missed_contact = v; }},
+    {"false-stop", [](PolicyOptions& o, double v) { o.noisy.noise.false_stop = v; }},
+    {"slip", [](PolicyOptions& o, double v) { o.noisy.noise.slip = v; }},
+    {"confidence", [](PolicyOptions& o, double v) { o.noisy.declaration.confidence = v; }},
+    {"wrong-cost", [](PolicyOptions& o, double v) { o.noisy.declaration.wrong_cells = v; }},
+    {"noisy-expansions", [](PolicyOptions& o, double v) { o.noisy.expansion_limit = static_cast<std::int64_t>(v); }},
     {"spiral-pitch", [](PolicyOptions& o, double v) { Spiral(o).pitch_m = v; }},
     {"spiral-speed", [](PolicyOptions& o, double v) { Spiral(o).speed_m_s = v; }},
     {"spiral-force", [](PolicyOptions& o, double v) { Spiral(o).press_n = v; }},

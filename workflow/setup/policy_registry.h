@@ -14,6 +14,7 @@
 #include "feeler/policies/policy.h"
 #include "feeler/policies/spiral/spiral_policy.h"
 #include "feeler/policies/storage/database.h"
+#include "feeler/workflow/setup/noisy_policies.h"
 #include "feeler/workflow/setup/planning_setup.h"
 
 namespace feeler::workflow {
@@ -35,12 +36,14 @@ using PolicyFactory = std::function<std::unique_ptr<policies::Policy>(const Poli
 struct PolicyOptions {
   int tbl_actions = 100;  ///< sampled per planning step by touch-based localization; 0: every action
   policies::OnlineOptions online;
+  NoisyPolicyOptions noisy;
   std::optional<policies::SpiralTuning> spiral;      ///< default: as derived for the task (DerivedSpiral)
   std::shared_ptr<const planner::ArrayStore> store;  ///< of bound tables for the processes of the host; null: none
   double hybrid_threshold_m = 0.0;                   ///< half width of the uncertainty; 0: DerivedHybridThreshold
 };
 /// Parses "key=value" settings of `--policy-option`: tbl-actions, online-seconds, online-expansions, spiral-pitch,
-/// spiral-speed, spiral-force, hybrid-threshold. Throws InputError listing the keys for an unknown one.
+/// spiral-speed, spiral-force, hybrid-threshold, missed-contact, false-stop, slip, confidence, wrong-cost,
+/// noisy-expansions. Throws InputError listing the keys for an unknown one.
 PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings);
 
 /// The spiral for the socket of a task, derived from what it catches, its lateral tolerance: turns two tolerances apart

@@ -122,6 +122,15 @@ TEST(DrawEpisode, RangesAreFilledAndKept) {
   }
 }
 
+TEST(DrawWorld, FalseStopsAreCountedPerMetre) {
+  const Task task = ThreeAxisTask();
+  const WorldDraw draw = DrawWorld(task, ParseFaults("false-stop=0.02"), 0.3, 5, 1);
+  // Without a false stop over a cell: 1 - 0.02.
+  EXPECT_NEAR(std::exp(-draw.robot.false_stops_per_m * task.cell_m), 0.98, 1e-12);
+  EXPECT_EQ(DrawWorld(task, ParseFaults("ideal"), 0.3, 5, 1).robot.false_stops_per_m, 0.0);
+  EXPECT_THROW((void)ParseFaults("false-stop=0.6"), InputError);
+}
+
 TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
   const Task task = ThreeAxisTask();
   const EpisodeFaults faults =
