@@ -165,7 +165,7 @@ void Show(const Flags& flags) {
   nlohmann::json json = ProblemJson(stored, database.identity().axes);
   if (stored.policy) {
     const workflow::PlanningSetup setup = SetupFor(database, flags);
-    const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
+    const planner::Problem problem = setup.ProblemOf(stored.extents);
     const planner::PolicyEvaluation evaluation = planner::Evaluate(problem, *stored.policy);
     json["policy_nodes"] = stored.policy->nodes.size();
     json["worst_cost"] = evaluation.worst_cost;
@@ -215,7 +215,7 @@ void Export(const Flags& flags) {
   inputs.push_back(flags.file);
   RequireOutputs({{"--out", flags.out, FileKind::kPolicy}}, inputs);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
-  const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored.extents);
+  const planner::Problem problem = setup.ProblemOf(stored.extents);
   WritePolicy(problem, *stored.policy, setup.task().name, flags.out);
 }
 

@@ -50,7 +50,7 @@ planner::Problem TaskProblem(const Flags& flags, const std::string& task, workfl
   if (database != nullptr) database->RequireFingerprint(setup.task().name, setup.fingerprint);
   const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
   workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
-  return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
+  return setup.ProblemOf(extents);
 }
 
 /// A policy of the database at --extents.

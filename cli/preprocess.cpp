@@ -35,6 +35,7 @@ struct Flags {
   std::string cost = "distance";
   std::string order = "uncertainty";
   std::string experience = "rollout";
+  std::string prior;
   std::string shard;
   bool estimate = false;
   int ranks = 1;
@@ -72,6 +73,7 @@ std::string RankIdentity(const workflow::PlanningSetup& setup, const planner::Pr
 
 planner::PreprocessOptions OptionsOf(const workflow::PlanningSetup& setup, planner::PreprocessOptions options) {
   options.openings = setup.opening == env::Opening::kOpen;
+  options.prior_deviation = setup.prior_deviation;
   return options;
 }
 
@@ -175,7 +177,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   options.experience = ParseExperience(flags.experience);
   const std::optional<workflow::Shard> shard = ShardOf(flags.shard);
   std::vector<std::string> inputs = InputsOfTask(flags.task);
-  inputs.push_back(flags.family);
+  inputs.insert(inputs.end(), {flags.family, flags.prior});
   if (!session.serves()) RequireOutputs({{"--out", flags.out, FileKind::kDatabase}}, inputs);
 
   CheckQuickly(flags.task, ParseOpening(flags.opening));
@@ -186,8 +188,9 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   setup_options.jobs = TableJobsOf(options.jobs, session);
   setup_options.on_cache_failure = TellCacheFailure;
   setup_options.progress = Interruptible(map_bar, session);
-  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
+  workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, setup_options);
   map_bar.Finish();
+  if (!flags.prior.empty()) workflow::UsePrior(flags.prior, setup);
   const planner::ProblemFamily family = FamilyFor(flags.family, setup);
   workflow::RequireWithinTask(family, setup.task());
 
@@ -195,7 +198,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   options.solver.on_tables = Interruptible(table_bar, session);
   ProgressBar bar(WithRanks("problems", session));
   options.progress = bar.Callback();
-  if (flags.estimate) return Estimate(setup, family, options, flags);
+  if (flags.estimate) return Estimate(setup, family, OptionsOf(setup, options), flags);
   if (session.ranks != nullptr) {
     const std::string identity = RankIdentity(setup, family, options);
     if (session.serves()) {
@@ -242,6 +245,10 @@ void AddPreprocessCommand(CLI::App& app, Session& session) {
                       "problems, a range or count per axis of the task, e.g. 2..15x2..15x2..15, or a JSON file of them "
                       "or an uncertainty table "
                       "(default: the task's ranges)");
+  command->add_option(
+      "--prior", flags->prior,
+      "uncertainty table of the task (feeler perceive calibrate): hypotheses are as likely as its errors "
+      "say (default: equally likely)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
   command->add_option("--cost", flags->cost, "distance (the task's feeler_cost) or time, in seconds")
       ->capture_default_str();

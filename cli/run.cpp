@@ -59,6 +59,7 @@ struct Flags {
   std::string placement = "nominal";
   std::string perception;
   std::string table;
+  std::string prior;
   std::string out;
   std::string video;
   std::int64_t episodes = 1;
@@ -83,7 +84,7 @@ std::string NoiseHelp() {
 
 std::vector<std::string> Inputs(const Flags& flags) {
   std::vector<std::string> inputs = InputsOfTask(flags.task);
-  inputs.insert(inputs.end(), {flags.db, flags.table});
+  inputs.insert(inputs.end(), {flags.db, flags.table, flags.prior});
   return inputs;
 }
 
@@ -94,6 +95,9 @@ void RequireSane(const Flags& flags) {
   if (flags.perception.empty() != flags.table.empty()) {
     throw InputError("--table", "goes with --perception, and --perception with --table",
                      "make a table with feeler perceive calibrate");
+  }
+  if (!flags.prior.empty() && !flags.db.empty()) {
+    throw InputError("--prior", "a database has the prior that it was made with", "leave out --prior or --db");
   }
   if (!flags.perception.empty() && !flags.extents.empty()) {
     throw InputError("--extents", "the camera decides on the problem", "leave out --extents or --perception");
@@ -177,6 +181,7 @@ nlohmann::json SettingsJson(const Flags& flags, const workflow::PlanningSetup& s
     std::ifstream in(flags.table, std::ios::binary);
     settings["table"] = policies::HashText(std::string(std::istreambuf_iterator<char>(in), {}));
   }
+  if (!setup.prior_deviation.empty()) settings["prior_deviation"] = setup.prior_deviation;
   return settings;
 }
 
@@ -204,8 +209,9 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   setup_options.on_cache_failure = TellCacheFailure;
   setup_options.progress = Interruptible(map_bar, session);
   CheckQuickly(flags.task, setup_options.opening);
-  const auto setup =
-      std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
+  workflow::PlanningSetup loaded = workflow::LoadPlanningSetup(flags.task, setup_options);
+  if (!flags.prior.empty()) workflow::UsePrior(flags.prior, loaded);
+  const auto setup = std::make_shared<const workflow::PlanningSetup>(std::move(loaded));
   map_bar.Finish();
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
 
@@ -350,6 +356,9 @@ void AddRunCommand(CLI::App& app, Session& session) {
   command->add_option("--perception", flags->perception,
                       "icp: hypotheses from a depth camera that looks at a target in the workspace (with --table)");
   command->add_option("--table", flags->table, "uncertainty table of the task (feeler perceive calibrate)");
+  command->add_option("--prior", flags->prior,
+                      "uncertainty table: policies that plan during the run take hypotheses to be as likely as its "
+                      "errors say (a database has the prior it was made with)");
   command->add_flag("--no-ladder", flags->no_ladder, "the bare policy with its executor, without fallbacks");
   AddReal(*command, "--confirm-limit", flags->confirm_limit_m, 1e-6, 1.0,
           "touch until the position across the insertion is known this well, m, default: 0.0005", false);

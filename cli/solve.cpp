@@ -24,6 +24,7 @@
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/policies/io/lattice_problem_file.h"
+#include "feeler/workflow/perception/perceive_table.h"
 #include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
@@ -35,6 +36,7 @@ struct Flags {
   std::string problem;
   std::string opening = "closed";
   std::string goal;
+  std::string prior;
   std::string cost = "distance";
   std::string out;
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -56,6 +58,9 @@ planner::Problem LoadProblem(const Flags& flags, const Session& session, planner
     if (!flags.extents.empty()) {
       throw InputError("--extents", "goes with --task, not with --problem", "leave it out");
     }
+    if (!flags.prior.empty()) {
+      throw InputError("--prior", "goes with --task, not with --problem", "put weights into the problem's file");
+    }
     planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
     if (!flags.goal.empty()) data.goal = ParseGoal(flags.goal);
     noise = data.noise;
@@ -70,10 +75,11 @@ planner::Problem LoadProblem(const Flags& flags, const Session& session, planner
   if (!flags.goal.empty()) options.goal = ParseGoal(flags.goal);
   options.jobs = Parallelism(flags.jobs);
   options.progress = Interruptible(bar, session);
-  const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
+  workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
+  if (!flags.prior.empty()) workflow::UsePrior(flags.prior, setup);
   const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
   workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
-  return planner::MakeCuboidProblem(setup.task(), setup.map, extents);
+  return setup.ProblemOf(extents);
 }
 
 /// "[x, y, z]", and the orientation where there are several.
@@ -141,7 +147,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
   planner::SolverOptions options = flags.solver.Options(command);
   options.cancellation = session.cancellation;
   std::vector<std::string> inputs = flags.task.empty() ? std::vector<std::string>() : InputsOfTask(flags.task);
-  inputs.push_back(flags.problem);
+  inputs.insert(inputs.end(), {flags.problem, flags.prior});
   RequireOutputs({{"--out", flags.out, FileKind::kPolicy}}, inputs);
   planner::Noise noise;
   const planner::Problem problem = LoadProblem(flags, session, noise);
@@ -205,6 +211,8 @@ void AddSolveCommand(CLI::App& app, Session& session) {
   command->add_option("--extents", flags->extents, "hypotheses per axis of the task, e.g. 7x7x5 (with --task)");
   command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
   command->add_option("--opening", flags->opening, "closed or open while localizing")->capture_default_str();
+  command->add_option("--prior", flags->prior,
+                      "uncertainty table of the task: hypotheses are as likely as its errors say");
   command->add_option("--goal", flags->goal, "singleton or insertable (default: the task's or file's)");
   command->add_option("--cost", flags->cost, "distance (the task's or file's weights) or time, in seconds")
       ->capture_default_str();

@@ -101,6 +101,24 @@ Eigen::VectorXd JointHalf(const UncertaintyTable& table, const UncertaintyRule& 
   return between + scale * Quantile(factors, options.quantile) * options.margin;
 }
 
+/// What estimates are off on a mounting that is not known: as mountings count, not samples.
+Eigen::VectorXd Deviation(const UncertaintyTable& table, const UncertaintyRule& rule,
+                          const std::vector<const PoseSample*>& samples) {
+  std::vector<Eigen::VectorXd> squares;
+  for (const PoseSample* sample : samples) {
+    squares.emplace_back(
+        OffsetAlong(table.axes, WithoutBias(table, rule, sample->world_T_estimate), sample->world_T_true).cwiseAbs2());
+  }
+  const std::map<int, Eigen::VectorXd> means = MeanByInstallation(samples, squares);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(table.axes.size()));
+  for (const auto& [installation, mean] : means) sum += mean / static_cast<double>(means.size());
+  for (Eigen::Index axis = 0; axis < sum.size(); ++axis) {
+    const double least = kLeastScale * table.axes[static_cast<std::size_t>(axis)].resolution;
+    sum[axis] = std::max(std::sqrt(sum[axis]), least);
+  }
+  return sum;
+}
+
 }  // namespace
 
 Eigen::Matrix3d ViewAxes(const Eigen::Vector3d& eye_m, const Eigen::Vector3d& target_m) {
@@ -176,6 +194,20 @@ bool Covers(const std::vector<UncertainAxis>& axes, const PoseHypotheses& hypoth
   return true;
 }
 
+std::vector<double> PriorDeviation(const UncertaintyTable& table) {
+  const auto count = static_cast<Eigen::Index>(table.axes.size());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(count);
+  double samples = 0.0;
+  for (const UncertaintyRule& rule : table.rules) {
+    if (rule.deviation.size() != count) return {};
+    const double weight = std::max(1, rule.samples);
+    sum += weight * rule.deviation.cwiseAbs2();
+    samples += weight;
+  }
+  const Eigen::VectorXd deviation = (sum / samples).cwiseSqrt();
+  return {deviation.data(), deviation.data() + count};
+}
+
 void FitRules(const std::vector<PoseSample>& samples, const TableOptions& options, UncertaintyTable& table) {
   if (options.ranges < 1 || !(options.quantile > 0.0 && options.quantile <= 1.0) || !(options.margin >= 1.0)) {
     throw InputError("uncertainty table", "an option is out of range", "ranges >= 1, 0 < quantile <= 1, margin >= 1");
@@ -206,6 +238,8 @@ void FitRules(const std::vector<PoseSample>& samples, const TableOptions& option
     rule.bias_m = MeanBias(table, own);
     rule.half = JointHalf(table, rule, own, options);
     plain.half = JointHalf(table, plain, own, options);
+    rule.deviation = Deviation(table, rule, own);
+    plain.deviation = Deviation(table, plain, own);
     table.rules.push_back(rule);
     table.plain_rules.push_back(plain);
   }

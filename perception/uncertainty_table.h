@@ -24,6 +24,9 @@ struct UncertaintyRule {
   Eigen::Vector3d bias_m = Eigen::Vector3d::Zero();
   /// Half extents along each uncertain axis of the task, in its order, about the estimate without bias: m or rad.
   Eigen::VectorXd half;
+  /// Standard deviation of the truth along each of those axes, about the middle of the half extents: within
+  /// installations and between them. Empty in tables of old.
+  Eigen::VectorXd deviation;
   int samples = 0;
 };
 
@@ -88,6 +91,10 @@ struct TableOptions {
 
 /// Fewest samples of a rule.
 constexpr std::size_t kLeastSamples = 20;
+
+/// The prior that the table makes: standard deviation along each uncertain axis over all its rules, by their samples.
+/// Empty if a rule does not know its own.
+std::vector<double> PriorDeviation(const UncertaintyTable& table);
 
 /// Fits the rules to samples; `table` brings task, axes and camera. Throws InputError for fewer than kLeastSamples.
 void FitRules(const std::vector<PoseSample>& samples, const TableOptions& options, UncertaintyTable& table);

@@ -20,6 +20,9 @@ nlohmann::ordered_json RulesJson(const std::vector<UncertaintyRule>& rules) {
     nlohmann::ordered_json json = {{"nearest_m", rule.nearest_m}, {"farthest_m", rule.farthest_m}};
     json["bias_m"] = {rule.bias_m.x(), rule.bias_m.y(), rule.bias_m.z()};
     json["half"] = std::vector<double>(rule.half.data(), rule.half.data() + rule.half.size());
+    if (rule.deviation.size() > 0) {
+      json["deviation"] = std::vector<double>(rule.deviation.data(), rule.deviation.data() + rule.deviation.size());
+    }
     json["samples"] = rule.samples;
     list.push_back(json);
   }
@@ -41,6 +44,24 @@ const nlohmann::json& ListAt(const nlohmann::json& root, const char* key, std::s
   return root.at(key);
 }
 
+/// One number for each axis, zero to `most`.
+Eigen::VectorXd PerAxis(const nlohmann::json& item, const char* key, std::size_t axes, double most,
+                        const std::string& where) {
+  const nlohmann::json& list = ListAt(item, key, axes, where);
+  if (list.size() != axes) {
+    throw InputError(where, fmt::format("'{}' has not one number for each axis", key), "see docs/file-formats.md");
+  }
+  Eigen::VectorXd values(static_cast<Eigen::Index>(axes));
+  for (std::size_t i = 0; i < axes; ++i) {
+    const double value = list[i].is_number() ? list[i].get<double>() : -1.0;
+    if (!(value >= 0.0 && value <= most)) {
+      throw InputError(where, fmt::format("'{}' holds what is no extent", key), "see docs/file-formats.md");
+    }
+    values[static_cast<Eigen::Index>(i)] = value;
+  }
+  return values;
+}
+
 std::vector<UncertaintyRule> ParseRules(const nlohmann::json& root, const char* key, std::size_t axes,
                                         const std::string& where) {
   constexpr double kFarthest_m = 100.0;
@@ -53,16 +74,8 @@ std::vector<UncertaintyRule> ParseRules(const nlohmann::json& root, const char* 
     rule.farthest_m = NumberAt(item, "farthest_m", 0.0, kFarthest_m, inside);
     rule.bias_m = VectorAt(item, "bias_m", inside);
     rule.samples = IntegerAt(item, "samples", 0, 1 << 30, inside);
-    const nlohmann::json& half = ListAt(item, "half", axes, inside);
-    if (half.size() != axes)
-      throw InputError(inside, "'half' has not one number for each axis", "see docs/file-formats.md");
-    rule.half.resize(static_cast<Eigen::Index>(axes));
-    for (std::size_t i = 0; i < axes; ++i) {
-      const double value = half[i].is_number() ? half[i].get<double>() : -1.0;
-      if (!(value >= 0.0 && value <= kLargestHalf))
-        throw InputError(inside, "'half' holds what is no half extent", "see docs/file-formats.md");
-      rule.half[static_cast<Eigen::Index>(i)] = value;
-    }
+    rule.half = PerAxis(item, "half", axes, kLargestHalf, inside);
+    if (item.contains("deviation")) rule.deviation = PerAxis(item, "deviation", axes, kLargestHalf, inside);
     if (!(rule.nearest_m < rule.farthest_m) || (!rules.empty() && rule.nearest_m != rules.back().farthest_m)) {
       throw InputError(inside, "the ranges of distance do not follow each other", "see docs/file-formats.md");
     }

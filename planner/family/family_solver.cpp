@@ -5,6 +5,7 @@
 
 #include "feeler/core/orientation_lattice.h"
 #include "feeler/planner/bounds/build_tables.h"
+#include "feeler/planner/family/prior.h"
 
 namespace feeler::planner {
 
@@ -13,6 +14,7 @@ FamilySolver::FamilySolver(const Task& task, std::shared_ptr<const ContactMap> m
     : task_(task),
       map_(std::move(map)),
       traits_{.openings = options.openings, .orientations = LatticeOrientations(task) > 1},
+      prior_deviation_(options.prior_deviation),
       solver_(options.solver),
       experience_(options.experience),
       tables_(options.tables) {
@@ -25,6 +27,12 @@ FamilySolver::FamilySolver(const Task& task, std::shared_ptr<const ContactMap> m
     tables_ = BuildPlanningTables(ProblemOf(LargestExtents(family)), WithFamilyBudget(solver_, traits_), jobs,
                                   options.store.get());
   }
+}
+
+Problem FamilySolver::ProblemOf(const Extents& extents) const {
+  Problem problem = MakeCuboidProblem(task_, map_, extents);
+  WeighByPrior(task_, prior_deviation_, extents, problem);
+  return problem;
 }
 
 SolverResult FamilySolver::Solve(const Extents& extents, const std::optional<SimilarProblem>& similar) const {

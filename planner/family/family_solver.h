@@ -24,12 +24,13 @@ class FamilySolver {
   const PlanningTables& tables() const { return *tables_; }
   /// Whether problems are solved with the policies of similar ones.
   bool needs_experience() const { return needs_experience_; }
-  Problem ProblemOf(const Extents& extents) const { return MakeCuboidProblem(task_, map_, extents); }
+  Problem ProblemOf(const Extents& extents) const;
 
  private:
   Task task_;
   std::shared_ptr<const ContactMap> map_;
   FamilyTraits traits_;
+  std::vector<double> prior_deviation_;
   SolverOptions solver_;
   ExperienceKind experience_;
   bool needs_experience_ = false;

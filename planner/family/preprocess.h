@@ -58,7 +58,8 @@ using DistantSolver = std::function<SolverResult(const Extents& extents, const s
 struct PreprocessOptions {
   /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them for each problem.
   SolverOptions solver;
-  bool openings = false;  ///< FamilyTraits::openings: the map does not tell
+  bool openings = false;                ///< FamilyTraits::openings: the map does not tell
+  std::vector<double> prior_deviation;  ///< of the hypotheses (WeighByPrior); empty: equally likely
   ProblemOrder order = ProblemOrder::kUncertainty;
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none
   std::uint64_t seed = 1;                                ///< of the random order

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "feeler/core/error.h"
@@ -106,6 +107,26 @@ TEST(UncertaintyTable, SurvivesItsFile) {
     EXPECT_EQ(HypothesesFor(read, sample.world_T_estimate).world_T_estimate.matrix(),
               HypothesesFor(table, sample.world_T_estimate).world_T_estimate.matrix());
   }
+}
+
+TEST(UncertaintyTable, KnowsItsDeviations) {
+  const UncertaintyTable table = FittedTable();
+  // Errors grow with the square of the distance; the table's deviation is that of what it was made from.
+  double sum = 0.0;
+  const std::vector<PoseSample> samples = Samples(800, 1);
+  for (const PoseSample& sample : samples) {
+    const double distance = (sample.world_T_true.translation() - kCamera).norm();
+    sum += std::pow(0.001 * distance * distance, 2);
+  }
+  const double expected = std::sqrt(sum / static_cast<double>(samples.size()));
+  const std::vector<double> deviation = PriorDeviation(table);
+  ASSERT_EQ(deviation.size(), 3u);
+  for (const double d : deviation) EXPECT_NEAR(d, expected, 0.15 * expected);
+  EXPECT_LT(table.rules.front().deviation.maxCoeff(), table.rules.back().deviation.minCoeff());
+  EXPECT_EQ(PriorDeviation(ParseTable(ToJson(table), "table.json")), deviation);
+  UncertaintyTable old = table;
+  old.rules.front().deviation.resize(0);
+  EXPECT_TRUE(PriorDeviation(ParseTable(ToJson(old), "table.json")).empty());
 }
 
 TEST(UncertaintyTable, OtherVersionsAndTasksAreRefused) {

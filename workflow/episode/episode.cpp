@@ -156,7 +156,7 @@ EpisodeRecord EpisodeRunner::Begin(std::uint64_t episode) {
       throw InputError("noise", "'fall-in' asks where the policy probes, and there is none",
                        "give a database with --db");
     }
-    const planner::Problem problem = planner::MakeCuboidProblem(setup_->task(), setup_->map, draw.extents);
+    const planner::Problem problem = setup_->ProblemOf(draw.extents);
     const auto policy = policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});
     DrawTruthThatFallsIn(episode, problem, *policy, draw);
   }
@@ -199,7 +199,7 @@ EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
     record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;
     return record;
   }
-  const planner::Problem problem = planner::MakeCuboidProblem(task, setup_->map, draw.extents);
+  const planner::Problem problem = setup_->ProblemOf(draw.extents);
   const double plan_start_s = ThreadCpuSeconds();
   const std::unique_ptr<policies::Policy> policy =
       policy_factory_({problem, draw.extents, *setup_, options_.seed, episode});

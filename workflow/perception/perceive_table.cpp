@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "feeler/core/error.h"
+#include "feeler/env/model/fingerprint.h"
 #include "feeler/perception/input_file.h"
 
 namespace feeler::workflow {
@@ -20,6 +21,16 @@ perception::UncertaintyTable LoadTable(const std::string& path, const Task& task
   if (table.axes.size() != task.axes.size())
     throw InputError(path, "has other axes than the task", "make one with feeler perceive calibrate");
   return table;
+}
+
+void UsePrior(const std::string& path, PlanningSetup& setup) {
+  const perception::UncertaintyTable table =
+      LoadTable(path, setup.task(), env::Fingerprint(setup.model, env::Opening::kClosed));
+  setup.prior_deviation = perception::PriorDeviation(table);
+  if (setup.prior_deviation.empty()) {
+    throw InputError(path, "does not know how its errors are spread ('deviation')",
+                     "make it anew with feeler perceive calibrate");
+  }
 }
 
 planner::ProblemFamily FamilyOfTable(const perception::UncertaintyTable& table, const Task& task,

@@ -56,6 +56,7 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
     settings["order_seed"] = options.seed;
   }
   if (setup.cost_kind == CostKind::kTime) settings["cost"] = ToString(setup.cost_kind);
+  if (!setup.prior_deviation.empty()) settings[kPriorSetting] = setup.prior_deviation;
   policies::DatabaseIdentity identity;
   identity.task = setup.task().name;
   identity.axes = planner::AxesOf(setup.task());
@@ -91,6 +92,7 @@ DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFa
   policies::Database database = policies::Database::OpenOrCreate(path, identity);
   planner::PreprocessOptions of_setup = options;
   of_setup.openings = setup.opening == env::Opening::kOpen;
+  of_setup.prior_deviation = setup.prior_deviation;
   policies::DatabaseSink sink(database, options.solver);
   DatabaseBuild build;
   build.summary = planner::Preprocess(setup.task(), setup.map, family, of_setup, sink);
@@ -115,7 +117,7 @@ DatabaseVerification VerifyDatabase(const PlanningSetup& setup, policies::Databa
     double error = 0.0;
     int hypotheses = 0;
     if (stored && stored->policy) {
-      const planner::Problem problem = planner::MakeCuboidProblem(setup.task(), setup.map, stored->extents);
+      const planner::Problem problem = setup.ProblemOf(stored->extents);
       const policies::RowVerification row = policies::VerifyRow(*stored, problem);
       error = std::abs(row.replayed_cost - stored->expected_cost);
       hypotheses = static_cast<int>(problem.hypotheses.size());

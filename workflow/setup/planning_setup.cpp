@@ -5,6 +5,7 @@
 #include "feeler/core/json_depth.h"
 #include "feeler/env/contact/contact_map_cache.h"
 #include "feeler/env/model/fingerprint.h"
+#include "feeler/planner/family/prior.h"
 #include "feeler/workflow/setup/contact_speeds.h"
 
 namespace feeler::workflow {
@@ -17,7 +18,24 @@ CostKind KindOf(const policies::DatabaseIdentity& identity) {
   return time ? CostKind::kTime : CostKind::kDistance;
 }
 
+/// Settings name the prior only where it is not uniform.
+std::vector<double> PriorOf(const policies::DatabaseIdentity& identity) {
+  const auto settings = ParseJsonText<nlohmann::json>(identity.settings);
+  std::vector<double> prior;
+  if (!settings.is_object() || !settings.contains(kPriorSetting)) return prior;
+  for (const nlohmann::json& deviation : settings.at(kPriorSetting)) {
+    prior.push_back(deviation.is_number() ? deviation.get<double>() : -1.0);
+  }
+  return prior;
+}
+
 }  // namespace
+
+planner::Problem PlanningSetup::ProblemOf(const planner::Extents& extents) const {
+  planner::Problem problem = planner::MakeCuboidProblem(task(), map, extents);
+  planner::WeighByPrior(task(), prior_deviation, extents, problem);
+  return problem;
+}
 
 std::string CostUnit(CostKind kind, const CostWeights& cost) {
   if (kind == CostKind::kTime) return "s";
@@ -33,6 +51,7 @@ PlanningSetupOptions SetupOptionsOf(const policies::DatabaseIdentity& identity) 
   options.goal = identity.goal == ToString(GoalKind::kInsertable) ? GoalKind::kInsertable : GoalKind::kSingleton;
   options.cost_kind = KindOf(identity);
   options.cost = identity.cost;
+  options.prior_deviation = PriorOf(identity);
   return options;
 }
 
@@ -47,6 +66,7 @@ PlanningSetup LoadPlanningSetup(const std::string& task, const PlanningSetupOpti
     setup.model.task.cost = speeds ? TimeCost(setup.task(), *speeds) : TimeCost(setup.task());
   }
   setup.cost_kind = options.cost_kind;
+  setup.prior_deviation = options.prior_deviation;
   setup.opening = options.opening;
   setup.map = std::make_shared<const planner::ContactMap>(
       env::GetContactMap(setup.model, options.opening, options.jobs, options.progress, options.on_cache_failure));
