@@ -44,15 +44,14 @@ std::string RockSampleText(const Flags& flags) {
   int size = 0;
   int rocks = 0;
   char rest = 0;
-  if (flags.format != "pomdp") throw InputError("--format", "RockSample is written as pomdp", "leave it out");
   if (std::sscanf(flags.rock_sample.c_str(), "%4dx%4d%c", &size, &rocks, &rest) != 2) {
     throw InputError("--rock-sample", "\"" + flags.rock_sample + "\"", "give size and rocks, e.g. 7x8");
   }
-  return planner::FormatCassandraPomdp(planner::MakeRockSample(planner::DrawRockSample(size, rocks, flags.seed)));
+  const planner::Pomdp pomdp = planner::MakeRockSample(planner::DrawRockSample(size, rocks, flags.seed));
+  return flags.format == "pomdp" ? planner::FormatCassandraPomdp(pomdp) : planner::FormatPomdpx(pomdp);
 }
 
 std::string NoisyText(const CLI::App& command, const Flags& flags, const planner::NoisyProblem& noisy) {
-  if (flags.format != "pomdp") throw InputError("--format", "noise is written as pomdp", "leave it out");
   if (command.count("--upper-bound") > 0) {
     throw InputError("--upper-bound", "does not go with noise", "--wrong-cost says what a wrong declaration costs");
   }
@@ -64,7 +63,7 @@ std::string NoisyText(const CLI::App& command, const Flags& flags, const planner
   if ((pomdp.transitions.entries.size() + 2 * rows) * kBytesPerLine > kMostBytes) {
     throw InputError(flags.problem, "takes more than 400 MB", "export a smaller problem");
   }
-  return planner::FormatCassandraPomdp(pomdp);
+  return flags.format == "pomdp" ? planner::FormatCassandraPomdp(pomdp) : planner::FormatPomdpx(pomdp);
 }
 
 void Run(const CLI::App& command, const Flags& flags) {

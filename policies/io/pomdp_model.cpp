@@ -10,6 +10,7 @@
 #include <set>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/noise/noisy_problem.h"
 
 namespace feeler::policies {
 namespace {
@@ -58,45 +59,6 @@ std::vector<Cell> ListCells(const Problem& problem, const std::vector<GuardedMov
     if (cells.size() > max_cells) break;
   }
   return cells;
-}
-
-/// The largest sets of hypotheses that are goals. Goal `insertable` bounds the spread per axis, so each such set is
-/// what a box of that size holds; boxes with faces at hypotheses suffice.
-std::vector<std::vector<int>> ListDeclarations(const Problem& problem) {
-  const auto count = static_cast<int>(problem.hypotheses.size());
-  std::set<std::vector<int>> sets;
-  if (problem.goal == GoalKind::kSingleton) {
-    for (int i = 0; i < count; ++i) sets.insert({i});
-  } else {
-    std::set<int> lows[3], orientations;
-    for (const Hypothesis& h : problem.hypotheses) {
-      for (int axis = 0; axis < 3; ++axis) lows[axis].insert(h.offset[axis]);
-      orientations.insert(h.orientation);
-    }
-    for (const int orientation : orientations) {
-      for (const int x : lows[0]) {
-        for (const int y : lows[1]) {
-          for (const int z : lows[2]) {
-            const CellBox box{Cell(x, y, z), Cell(x, y, z) + problem.insertable_spread};
-            std::vector<int> inside;
-            for (int i = 0; i < count; ++i) {
-              const Hypothesis& h = problem.hypotheses[static_cast<std::size_t>(i)];
-              if (h.orientation == orientation && box.Contains(h.offset)) inside.push_back(i);
-            }
-            if (!inside.empty()) sets.insert(inside);
-          }
-        }
-      }
-    }
-  }
-  std::vector<std::vector<int>> largest;
-  for (const std::vector<int>& set : sets) {
-    const bool contained = std::any_of(sets.begin(), sets.end(), [&](const std::vector<int>& other) {
-      return other.size() > set.size() && std::includes(other.begin(), other.end(), set.begin(), set.end());
-    });
-    if (!contained) largest.push_back(set);
-  }
-  return largest;
 }
 
 /// Cost at which an optimal policy for a pair of hypotheses tells it apart.
@@ -209,7 +171,7 @@ PomdpModel MakePomdpModel(const Problem& problem, double upper_bound, std::size_
     throw InputError(problem.name.empty() ? "problem" : problem.name,
                      fmt::format("has more than {} transitions", max_steps), "export a smaller problem");
   }
-  model.declarations = ListDeclarations(problem);
+  model.declarations = planner::LargestGoalSets(problem);
   double total_weight = 0.0;
   for (const Hypothesis& h : problem.hypotheses) total_weight += h.weight;
   for (const Hypothesis& h : problem.hypotheses) model.prior.push_back(h.weight / total_weight);

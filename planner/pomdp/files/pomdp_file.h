@@ -21,6 +21,10 @@ std::string FormatCassandraPomdp(const Pomdp& pomdp);
 /// up. The joint states are those that can be met from the initial belief. Throws InputError at `NAME:LINE`.
 Pomdp ParsePomdpx(std::string_view text, const std::string& name);
 
+/// Writes it with one variable of each kind. Reads back to the same model where its names begin with a letter and are
+/// free of blanks, but for states that cannot be met.
+std::string FormatPomdpx(const Pomdp& pomdp);
+
 /// Either, by the extension of the file. Throws InputError if it cannot be read.
 Pomdp ReadPomdp(const std::string& path);
 

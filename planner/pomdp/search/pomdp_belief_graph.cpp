@@ -11,7 +11,56 @@ PomdpBeliefGraph::PomdpBeliefGraph(const Pomdp& pomdp, const StateBounds& bounds
     constant_ = *std::ranges::max_element(pomdp.reward);
     to_goal_ = constant_ / (1.0 - pomdp.discount);
   }
+  if (pomdp.discount == 1.0 && levels == 0) FindTwins();
   Intern(pomdp.start);
+}
+
+void PomdpBeliefGraph::FindTwins() {
+  const auto same = [&](std::uint32_t s, std::uint32_t t) {
+    for (std::size_t a = 0; a < pomdp_.action_count(); ++a) {
+      if (pomdp_.reward[pomdp_.At(a, s)] != pomdp_.reward[pomdp_.At(a, t)]) return false;
+      const auto equal = [](const SparseEntry& x, const SparseEntry& y) {
+        return x.index == y.index && x.value == y.value;
+      };
+      if (!std::ranges::equal(pomdp_.transitions.Row(pomdp_.At(a, s)), pomdp_.transitions.Row(pomdp_.At(a, t)), equal))
+        return false;
+    }
+    return true;
+  };
+  std::unordered_multimap<std::uint64_t, std::uint32_t> first;
+  for (std::uint32_t s = 0; s < pomdp_.state_count(); ++s) {
+    std::uint64_t hash = 0x9E3779B97F4A7C15;
+    for (std::size_t a = 0; a < pomdp_.action_count(); ++a) {
+      for (const SparseEntry& e : pomdp_.transitions.Row(pomdp_.At(a, s))) {
+        hash = (hash ^ e.index) * 0xFF51AFD7ED558CCD;
+        hash ^= hash >> 31;
+      }
+    }
+    std::uint32_t twin = s;
+    const auto [begin, end] = first.equal_range(hash);
+    for (auto it = begin; it != end && twin == s; ++it) {
+      if (same(it->second, s)) twin = it->second;
+    }
+    if (twin == s) first.emplace(hash, s);
+    twin_.push_back(twin);
+  }
+}
+
+std::vector<SparseEntry> PomdpBeliefGraph::Merged(std::span<const SparseEntry> belief) const {
+  std::vector<SparseEntry> merged(belief.begin(), belief.end());
+  if (twin_.empty()) return merged;
+  for (SparseEntry& s : merged) s.index = twin_[s.index];
+  std::ranges::sort(merged, {}, &SparseEntry::index);
+  std::size_t count = 0;
+  for (const SparseEntry& s : merged) {
+    if (count > 0 && merged[count - 1].index == s.index) {
+      merged[count - 1].value += s.value;
+    } else {
+      merged[count++] = s;
+    }
+  }
+  merged.resize(count);
+  return merged;
 }
 
 bool PomdpBeliefGraph::IsGoal(std::span<const SparseEntry> belief) const {
@@ -40,6 +89,10 @@ bool PomdpBeliefGraph::Same(std::span<const SparseEntry> a, std::span<const Spar
 }
 
 std::uint32_t PomdpBeliefGraph::Find(std::span<const SparseEntry> belief) const {
+  return twin_.empty() ? FindMerged(belief) : FindMerged(Merged(belief));
+}
+
+std::uint32_t PomdpBeliefGraph::FindMerged(std::span<const SparseEntry> belief) const {
   const auto [begin, end] = index_.equal_range(HashOf(belief));
   for (auto it = begin; it != end; ++it) {
     if (Same(beliefs_[it->second].states, belief)) return it->second;
@@ -48,7 +101,8 @@ std::uint32_t PomdpBeliefGraph::Find(std::span<const SparseEntry> belief) const 
 }
 
 std::uint32_t PomdpBeliefGraph::Intern(std::vector<SparseEntry> belief) {
-  const std::uint32_t known = Find(belief);
+  if (!twin_.empty()) belief = Merged(belief);
+  const std::uint32_t known = FindMerged(belief);
   if (known != kNone) return known;
   const auto number = static_cast<std::uint32_t>(beliefs_.size());
   index_.emplace(HashOf(belief), number);
@@ -64,6 +118,25 @@ double PomdpBeliefGraph::CostOf(std::span<const SparseEntry> belief, std::size_t
   return cost;
 }
 
+bool PomdpBeliefGraph::RepeatUntilChanged(std::uint32_t b, bool to_goal, Action& action) {
+  double stays = 0.0;
+  std::size_t kept = action.first;
+  for (std::size_t i = action.first; i < successors_.size(); ++i) {
+    if (successors_[i].belief == b) {
+      stays += successors_[i].share;
+    } else {
+      successors_[kept++] = successors_[i];
+    }
+  }
+  successors_.resize(kept);
+  action.count = static_cast<std::uint32_t>(kept) - action.first;
+  if (action.count == 0 && !to_goal) return false;
+  if (!(stays > 0.0)) return true;
+  action.cost /= 1.0 - stays;
+  for (std::size_t i = action.first; i < kept; ++i) successors_[i].share /= 1.0 - stays;
+  return true;
+}
+
 void PomdpBeliefGraph::Expand(std::uint32_t b) {
   const std::vector<SparseEntry> belief = beliefs_[b].states;  // Intern may move the beliefs
   const auto first_action = static_cast<std::uint32_t>(actions_.size());
@@ -71,11 +144,12 @@ void PomdpBeliefGraph::Expand(std::uint32_t b) {
   for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
     Action action{CostOf(belief, a), a, static_cast<std::uint32_t>(successors_.size()), 0};
     bool moves = false;
+    bool to_goal = false;
     update(belief, a, [&](std::uint32_t o, double probability, const std::vector<SparseEntry>& next) {
       const double share = probability * pomdp_.discount;
       if (IsGoal(next)) {
         action.cost += share * to_goal_;
-        moves = true;
+        moves = to_goal = true;
         return;
       }
       const std::uint32_t successor = Intern(next);
@@ -88,6 +162,7 @@ void PomdpBeliefGraph::Expand(std::uint32_t b) {
       successors_.resize(action.first);
       continue;
     }
+    if (!twin_.empty() && !RepeatUntilChanged(b, to_goal, action)) continue;
     actions_.push_back(action);
     bytes_ += sizeof(Action) + action.count * sizeof(Successor);
   }

@@ -24,6 +24,12 @@ namespace feeler::planner {
 /// Beliefs are normalised, weights are 1. `levels` = 0: two beliefs are one if they agree up to rounding (1e-12), and
 /// what a search proves here holds for the POMDP. `levels` = D > 0: RTDP-Bel's discretisation, d(b)(s) = ceil(D b(s));
 /// the first belief met stands for all that share its d(b), and nothing is proven.
+///
+/// Without discount an action may cost nothing and leave a belief as it is for a while, and lower bounds do not rise
+/// along a way that costs nothing and comes back. So, with exact beliefs, states of the same future are one (the
+/// reading that led to a state is no part of what follows), and an action that leaves the belief as it is with
+/// probability q < 1 is repeated until it does not: cost and shares over 1 - q, which changes no optimal value.
+/// Successors() then leaves the belief itself out.
 class PomdpBeliefGraph {
  public:
   struct Action {
@@ -84,6 +90,13 @@ class PomdpBeliefGraph {
     std::uint32_t first_action = kUnexpanded;
     std::uint32_t action_count = 0;
   };
+  /// With a discount of 1 and exact beliefs: for each state the first of the same rewards and transitions.
+  void FindTwins();
+  /// The belief over those first states.
+  std::vector<SparseEntry> Merged(std::span<const SparseEntry> belief) const;
+  std::uint32_t FindMerged(std::span<const SparseEntry> belief) const;
+  /// Takes the belief itself out of the successors of its last action. False: nothing else follows, nor a goal.
+  bool RepeatUntilChanged(std::uint32_t b, bool to_goal, Action& action);
   std::int64_t Level(double probability) const;
   std::uint64_t HashOf(std::span<const SparseEntry> belief) const;
   bool Same(std::span<const SparseEntry> a, std::span<const SparseEntry> b) const;
@@ -93,8 +106,9 @@ class PomdpBeliefGraph {
   const StateBounds& bounds_;
   int levels_;
   std::vector<std::uint8_t> absorbing_;
-  double constant_ = 0.0;  ///< C
-  double to_goal_ = 0.0;   ///< C / (1 - discount); 0 with a discount of 1
+  std::vector<std::uint32_t> twin_;  ///< empty: each its own
+  double constant_ = 0.0;            ///< C
+  double to_goal_ = 0.0;             ///< C / (1 - discount); 0 with a discount of 1
   std::vector<Node> beliefs_;
   std::vector<Action> actions_;
   std::vector<Successor> successors_;
