@@ -19,6 +19,7 @@
 #include "feeler/evaluation/studies/noise_price.h"
 #include "feeler/evaluation/studies/perception.h"
 #include "feeler/evaluation/studies/pomdp_benchmarks.h"
+#include "feeler/evaluation/studies/pomdp_experience.h"
 #include "feeler/evaluation/studies/spiral_tuning.h"
 
 namespace feeler::evaluation {
@@ -47,6 +48,8 @@ std::vector<Experiment> AllExperiments() {
        RunPerception},
       {kPomdpBenchmarksName, "general POMDPs: proven intervals over time beside SARSOP's, and RTDP-Bel",
        RunPomdpBenchmarks, false, false, true},
+      {kPomdpExperienceName, "families of general POMDPs: RTDP-Bel against E-RTDP-Bel with a similar problem's policy",
+       RunPomdpExperience},
       {kSpiralTuningName, "pitch, speed and force of the spiral search, per socket", RunSpiralTuning},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
        true},
