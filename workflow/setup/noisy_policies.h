@@ -15,8 +15,9 @@ namespace feeler::workflow {
 struct NoisyPolicyOptions {
   planner::Noise noise;  ///< of single steps; some must be above 0
   planner::Declaration declaration;
-  /// A budget that gives the same policy everywhere.
-  std::int64_t expansion_limit = 3000;
+  /// A budget that gives the same policy everywhere. Below what a first policy needs (several hundred for 3 x 3 x 3)
+  /// the policy gives up at once.
+  std::int64_t expansion_limit = 200'000;
   double gap = 1.2;
 };
 

@@ -103,7 +103,7 @@ TEST(Doubt, InsertsWhereReadingsAtTheirWordLoseTheTree) {
   const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3});
   const planner::Noise noise{0.0, 0.02, 0.0};
   planner::SolverOptions options;
-  options.expansion_limit = 300;
+  options.expansion_limit = 2000;  // a first policy needs several hundred
   planner::NoisyResult doubting = planner::SolveNoisy({problem, noise, {}}, options);
   policies::NoisyGraphPolicy noisy(std::make_shared<const planner::NoisyPolicy>(std::move(doubting.policy)),
                                    policies::Doubt{noise, planner::Declaration{}.confidence});
