@@ -63,7 +63,7 @@ void Perceive(const Flags& flags) {
     family.problems.clear();
     for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
   }
-  const workflow::TargetFinder finder(model);
+  const workflow::TargetFinder finder(model, workflow::SettingsOf(table));
   const perception::Registration found = Locate(flags.sources, finder, table, task.world_T_target.translation());
   if (!found.found)
     throw NegativeResult(flags.sources.depth + flags.sources.cloud, "target not found: " + found.reason);
@@ -95,6 +95,9 @@ void Perceive(const Flags& flags) {
   json["clamped"] = hypotheses.clamped;
   json["fitness"] = found.fitness;
   json["explained"] = found.explained;
+  json["beyond"] = found.beyond;
+  json["seen_through"] = found.seen_through;
+  json["missing_m2"] = found.missing_m2;
   json["rms_m"] = found.rms_m;
   json["points"] = found.points;
   json["covariance"] = nlohmann::ordered_json::array();

@@ -78,7 +78,7 @@ PerceivedTarget FindTarget(const std::string& task, const std::string& db, const
     family.problems.clear();
     for (const policies::StoredProblem& problem : database.List()) family.problems.push_back(problem.extents);
   }
-  const workflow::TargetFinder finder(model);
+  const workflow::TargetFinder finder(model, workflow::SettingsOf(table));
   const perception::Registration found = Locate(sources, finder, table, model.task.world_T_target.translation());
   if (!found.found) throw NegativeResult(sources.depth + sources.cloud, "target not found: " + found.reason);
   const perception::PoseHypotheses hypotheses = perception::HypothesesFor(table, found.world_T_target);

@@ -16,8 +16,9 @@ namespace {
 
 using CubeKey = std::array<std::int64_t, 3>;
 
-/// A number for each point, the same for points whose cubes of edge `link_m` touch, directly or by others.
-std::vector<int> Groups(const Points& points, double link_m, int& groups) {
+}  // namespace
+
+std::vector<int> GroupsOf(const Points& points, double link_m, int& groups) {
   std::map<CubeKey, std::vector<std::size_t>> cubes;
   for (std::size_t i = 0; i < points.size(); ++i) {
     CubeKey key;
@@ -49,13 +50,11 @@ std::vector<int> Groups(const Points& points, double link_m, int& groups) {
   return group;
 }
 
-}  // namespace
-
 std::vector<Cluster> DensestClusters(const Points& points, double link_m, double neighbourhood_m, double reach_m,
                                      int least_points, int count) {
   if (points.empty()) return {};
   int groups = 0;
-  const std::vector<int> group_of = Groups(points, link_m, groups);
+  const std::vector<int> group_of = GroupsOf(points, link_m, groups);
   std::vector<std::vector<std::size_t>> members(static_cast<std::size_t>(groups));
   for (std::size_t i = 0; i < points.size(); ++i) members[static_cast<std::size_t>(group_of[i])].push_back(i);
 

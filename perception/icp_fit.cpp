@@ -204,44 +204,4 @@ FitQuality Judge(const IcpFit& fit, const Pose& pose, Eigen::MatrixXd* covarianc
   return quality;
 }
 
-Contradiction Contradict(const IcpFit& fit, const Pose& pose) {
-  constexpr double kAround_m = 0.04;  // how far beyond an edge is looked
-  constexpr double kSamePlane_m = 0.005;
-  constexpr double kBehind_m = 0.02;
-  constexpr double kMet_m2 = kMet_m * kMet_m;
-  Contradiction contradiction;
-  const View view = ViewOf(fit, pose);
-  if (view.surface.points.empty() || fit.scene.empty()) return contradiction;
-  const Pose inverse = pose.inverse();
-  const Eigen::Vector3d eye_m = inverse * fit.eye_m;
-  std::size_t near = 0;
-  std::size_t beyond = 0;
-  Points directions;  // in which the scene was measured
-  std::vector<double> ranges_m;
-  for (const Eigen::Vector3d& p : fit.scene) {
-    const Eigen::Vector3d q = inverse * p;
-    directions.push_back((q - eye_m).normalized());
-    ranges_m.push_back((q - eye_m).norm());
-    const NearestPoints::Hit hit = view.tree.Nearest(q);
-    if (hit.squared_m2 < kMet_m2) {
-      ++near;
-    } else if (hit.squared_m2 < kAround_m * kAround_m) {
-      const double off = view.surface.normals[hit.index].dot(q - view.surface.points[hit.index]);
-      if (std::abs(off) < kSamePlane_m) ++beyond;
-    }
-  }
-  if (near > 0) contradiction.beyond = static_cast<double>(beyond) / static_cast<double>(near);
-  const NearestPoints sight(directions);
-  std::size_t through = 0;
-  for (const Eigen::Vector3d& m : view.surface.points) {
-    if (fit.scene_tree.Nearest(pose * m).squared_m2 < kMet_m2) continue;
-    const double range_m = (m - eye_m).norm();
-    const NearestPoints::Hit hit = sight.Nearest((m - eye_m) / range_m);
-    const double angle = fit.scene_spacing_m / range_m;  // between neighbours of what was measured
-    if (hit.squared_m2 < angle * angle && ranges_m[hit.index] > range_m + kBehind_m) ++through;
-  }
-  contradiction.seen_through = static_cast<double>(through) / static_cast<double>(view.surface.points.size());
-  return contradiction;
-}
-
 }  // namespace feeler::perception

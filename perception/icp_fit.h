@@ -11,9 +11,6 @@
 
 namespace feeler::perception {
 
-/// A measured point nearer than this to the model, or a point of the model to a measured one, is met.
-inline constexpr double kMet_m = 0.012;
-
 /// What a pose of the target is fitted to, at one level of detail. References; copy it freely while they live.
 struct IcpFit {
   const Points& scene;  ///< in the world, thinned to `scene_spacing_m`
@@ -41,20 +38,5 @@ struct FitQuality {
 };
 /// `covariance`, if not null, is that of Registration.
 FitQuality Judge(const IcpFit& fit, const Pose& world_T_target, Eigen::MatrixXd* covariance = nullptr);
-
-/// What speaks against a pose that many points of the model agree with.
-struct Contradiction {
-  /// Measured points that carry a face of the model on beyond its edges, over those that the model explains: of
-  /// something larger than the target.
-  double beyond = 0.0;
-  /// Share of what should be seen of the model that the camera sees through: what it measured there lies behind. What
-  /// is hidden, or was not measured, is no contradiction.
-  double seen_through = 0.0;
-  bool any() const { return beyond > kMostBeyond || seen_through > kMostSeenThrough; }
-
-  static constexpr double kMostBeyond = 0.25;
-  static constexpr double kMostSeenThrough = 0.06;
-};
-Contradiction Contradict(const IcpFit& fit, const Pose& world_T_target);
 
 }  // namespace feeler::perception

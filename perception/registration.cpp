@@ -13,6 +13,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/perception/clusters.h"
+#include "feeler/perception/contradiction.h"
 #include "feeler/perception/icp_fit.h"
 
 namespace feeler::perception {
@@ -118,14 +119,18 @@ std::vector<Candidate> Best(std::vector<Candidate> candidates, const Eigen::Matr
   return best;
 }
 
-struct ClusterFit {
-  Registration registration;
-  Contradiction contradiction;
+/// What stays the same for all clusters.
+struct Search {
+  const TargetModel& model;
+  const Eigen::Matrix3d& orientation;
+  const Eigen::Vector3d& eye_m;
+  const RegistrationOptions& options;
+  const SightGrid& sight;
 };
 
 /// The fit of one cluster. Fitness is zero where none is to be had.
-ClusterFit RegisterCluster(const Points& cluster, const TargetModel& model, const Eigen::Matrix3d& orientation,
-                           const Eigen::Vector3d& eye_m, const RegistrationOptions& options, bool thorough) {
+Registration RegisterCluster(const Points& cluster, const Search& search, bool thorough) {
+  const auto& [model, orientation, eye_m, options, sight] = search;
   constexpr double kRoughSpacing_m = 0.016;
   const Points rough_scene = Thinned(cluster, kRoughSpacing_m);
   const NearestPoints rough_tree(rough_scene);
@@ -147,9 +152,8 @@ ClusterFit RegisterCluster(const Points& cluster, const TargetModel& model, cons
     settled.push_back(refined(candidate.world_T_target, 0.05, 0.04, 8));
   }
   settled = Best(std::move(settled), orientation, kMostTurn_rad, 1);
-  ClusterFit fit;
-  Registration& result = fit.registration;
-  if (settled.empty()) return fit;
+  Registration result;
+  if (settled.empty()) return result;
   Pose pose = settled.front().world_T_target;
 
   const NearestPoints tree(cluster);
@@ -161,32 +165,36 @@ ClusterFit RegisterCluster(const Points& cluster, const TargetModel& model, cons
   result.explained = quality.explained;
   result.rms_m = quality.rms_m;
   result.points = static_cast<int>(cluster.size());
-  fit.contradiction = Contradict(fine, pose);
-  return fit;
+  Contradict(fine, model, sight, pose, result);
+  return result;
 }
 
-/// What nothing speaks against comes before what something does.
-bool Better(const ClusterFit& a, const ClusterFit& b, double score_a, double score_b) {
-  if (a.contradiction.any() != b.contradiction.any()) return a.registration.fitness > 0 && !a.contradiction.any();
+/// What nothing speaks against comes before what something does, and anything before nothing.
+bool Better(const Registration& a, const Registration& b, const MatchLimits& limits, double score_a, double score_b) {
+  if (a.points == 0 || b.points == 0) return a.points > 0;
+  if (limits.Contradicted(a) != limits.Contradicted(b)) return !limits.Contradicted(a);
   return score_a > score_b;
 }
 
-std::string WhyNotFound(const ClusterFit& best, const RegistrationOptions& options) {
-  const Registration& fit = best.registration;
+std::string WhyNotFound(const Registration& fit, const MatchLimits& limits) {
   if (fit.points == 0) {
     return fmt::format("every fit is turned by more than {:.0f} degrees", kMostTurn_rad * 57.29577951308232);
   }
-  if (fit.fitness < options.least_fitness) {
+  if (fit.fitness < limits.least_fitness) {
     return fmt::format("the best fit meets {:.0f} % of what should be seen of the target, below {:.0f} %",
-                       100.0 * fit.fitness, 100.0 * options.least_fitness);
+                       100.0 * fit.fitness, 100.0 * limits.least_fitness);
   }
-  if (best.contradiction.beyond > Contradiction::kMostBeyond) {
+  if (fit.beyond > limits.most_beyond) {
     return fmt::format(
-        "what is seen is larger than the target: beyond its edges {:.0f} % as many points lie on its faces as within",
-        100.0 * best.contradiction.beyond);
+        "what is seen is larger than the target: it goes on beyond {:.1f} % of its edges, above {:.1f} %",
+        100.0 * fit.beyond, 100.0 * limits.most_beyond);
   }
-  return fmt::format("the camera sees through {:.0f} % of where the target would be",
-                     100.0 * best.contradiction.seen_through);
+  if (fit.seen_through > limits.most_seen_through) {
+    return fmt::format("the camera sees through {:.1f} % of where the target would be, above {:.1f} %",
+                       100.0 * fit.seen_through, 100.0 * limits.most_seen_through);
+  }
+  return fmt::format("{:.1f} cm2 of the target in one piece are missing, above {:.1f}: the camera sees through them",
+                     1e4 * fit.missing_m2, 1e4 * limits.most_missing_m2);
 }
 
 }  // namespace
@@ -217,7 +225,7 @@ void RegistrationOptions::Validate() const {
 }
 
 Registration Register(const Points& scene, const TargetModel& model, const Eigen::Matrix3d& nominal_orientation,
-                      const Eigen::Vector3d& eye_m, const RegistrationOptions& options) {
+                      const Eigen::Vector3d& eye_m, const RegistrationOptions& options, const Points& measured) {
   options.Validate();
   Points finite;
   finite.reserve(scene.size());
@@ -225,8 +233,7 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
   for (const Eigen::Vector3d& p : scene) {
     if (p.allFinite() && p.cwiseAbs().maxCoeff() < kFarthest_m) finite.push_back(p);
   }
-  ClusterFit chosen;
-  Registration& best = chosen.registration;
+  Registration best;
   const Points thinned = Thinned(finite, options.scene_spacing_m);
   if (thinned.empty()) {
     best.reason = "no points are left once the background is taken away";
@@ -238,11 +245,15 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
     best.reason = fmt::format("no group of {} points that belong together", options.least_points);
     return best;
   }
+  const SightGrid sight(measured.empty() ? finite : measured, eye_m, clusters.front().densest_m,
+                        options.scene_spacing_m);
+  const MatchLimits& limits = options.limits;
+  const Search search{model, nominal_orientation, eye_m, options, sight};
   for (const Cluster& cluster : clusters) {
-    ClusterFit fit = RegisterCluster(cluster.points, model, nominal_orientation, eye_m, options, false);
-    if (Better(fit, chosen, fit.registration.fitness, best.fitness)) chosen = std::move(fit);
+    Registration fit = RegisterCluster(cluster.points, search, false);
+    if (Better(fit, best, limits, fit.fitness, best.fitness)) best = std::move(fit);
   }
-  if (best.fitness < kSureFitness || best.rms_m > kSureRms_m || chosen.contradiction.any()) {
+  if (best.fitness < kSureFitness || best.rms_m > kSureRms_m || limits.Contradicted(best)) {
     // Something may stand before the target and cut it in two: all that is near belongs to it, and fits start aside
     // too.
     Points middles;
@@ -254,13 +265,13 @@ Registration Register(const Points& scene, const TargetModel& model, const Eigen
       middles.push_back(cluster.densest_m);
       Points company;
       std::copy_if(thinned.begin(), thinned.end(), std::back_inserter(company), near(2.0 * model.radius_m()));
-      ClusterFit fit = RegisterCluster(company, model, nominal_orientation, eye_m, options, true);
+      Registration fit = RegisterCluster(company, search, true);
       const auto score = [](const Registration& r) { return r.fitness - r.rms_m / kMet_m; };
-      if (Better(fit, chosen, score(fit.registration), score(best))) chosen = std::move(fit);
+      if (Better(fit, best, limits, score(fit), score(best))) best = std::move(fit);
     }
   }
-  best.found = best.fitness >= options.least_fitness && !chosen.contradiction.any();
-  if (!best.found) best.reason = WhyNotFound(chosen, options);
+  best.found = limits.Allow(best);
+  if (!best.found) best.reason = WhyNotFound(best, limits);
   return best;
 }
 

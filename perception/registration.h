@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "feeler/core/pose.h"
+#include "feeler/perception/match_evidence.h"
 #include "feeler/perception/nearest_points.h"
 #include "feeler/perception/point_cloud.h"
 
@@ -47,20 +48,17 @@ struct RegistrationOptions {
   double neighbourhood_m = 0.05;  ///< clusters are ranked by how many points the densest ball of this radius holds
   int clusters = 3;               ///< how many of them are tried
   double scene_spacing_m = 0.006;
-  double least_fitness = 0.55;  ///< below, the target counts as not found
-  int least_points = 60;        ///< of the thinned scene
-  void Validate() const;        ///< throws InputError
+  MatchLimits limits;     ///< beyond them, the target counts as not found
+  int least_points = 60;  ///< of the thinned scene
+  void Validate() const;  ///< throws InputError
 };
 
-struct Registration {
+struct Registration : MatchEvidence {
   bool found = false;
   std::string reason;  ///< why not
   Pose world_T_target = Pose::Identity();
-  /// Share of the model's visible points that have a measured point near (12 mm), 0..1.
-  double fitness = 0.0;
-  double explained = 0.0;  ///< share of the cluster's points that lie near the model, 0..1
-  double rms_m = 0.0;      ///< distance of the explained points from the model's surface
-  int points = 0;          ///< measured points used
+  double rms_m = 0.0;  ///< distance of the explained points from the model's surface
+  int points = 0;      ///< measured points used
   /// Of (x, y, z in axes of the target, m; turns about rotation_axes, rad), from the residuals, as if points erred
   /// independently: what the noise of single points explains, without bias and installation errors, which the table
   /// (perception/uncertainty_table.h) holds.
@@ -74,7 +72,12 @@ struct Registration {
 /// Point-to-plane ICP (Chen and Medioni 1992) from scene to what the eye sees of the model, blended with a term along
 /// the faces in both directions, by Gauss-Newton in position and the given turns; pairs beyond a shrinking gate are
 /// left out. A pure function of its arguments, whatever the order of `scene`. Points that are not finite are ignored.
+///
+/// A match must explain what is seen: it is refused where the scene goes on beyond the edges of the model, or is seen
+/// where the model would hide it. `measured`: all that the camera measured, background too, which tells where it sees
+/// through; empty: `scene`.
 Registration Register(const Points& scene, const TargetModel& model, const Eigen::Matrix3d& nominal_orientation,
-                      const Eigen::Vector3d& eye_m, const RegistrationOptions& options = {});
+                      const Eigen::Vector3d& eye_m, const RegistrationOptions& options = {},
+                      const Points& measured = {});
 
 }  // namespace feeler::perception

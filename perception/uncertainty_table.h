@@ -6,6 +6,7 @@
 
 #include "feeler/core/pose.h"
 #include "feeler/core/task.h"
+#include "feeler/perception/match_evidence.h"
 
 namespace feeler::perception {
 
@@ -40,6 +41,7 @@ struct UncertaintyTable {
   std::vector<UncertainAxis> axes;
   Eigen::Vector3d camera_m = Eigen::Vector3d::Zero();  ///< where the camera stands, world
   int averaged_frames = 1;
+  MatchLimits limits;  ///< which matches are believed; the defaults in tables that have none
   std::vector<UncertaintyRule> rules;
   /// The same without taking the bias out, as in the paper: half extents about the estimate itself.
   std::vector<UncertaintyRule> plain_rules;

@@ -101,6 +101,10 @@ std::string ToJson(const UncertaintyTable& table, const std::string& report_json
   }
   json["camera_m"] = {table.camera_m.x(), table.camera_m.y(), table.camera_m.z()};
   json["averaged_frames"] = table.averaged_frames;
+  json["limits"] = {{"least_fitness", table.limits.least_fitness},
+                    {"most_beyond", table.limits.most_beyond},
+                    {"most_seen_through", table.limits.most_seen_through},
+                    {"most_missing_m2", table.limits.most_missing_m2}};
   json["rules"] = RulesJson(table.rules);
   json["plain_rules"] = RulesJson(table.plain_rules);
   if (!report_json.empty()) json["report"] = ParseJsonText<nlohmann::ordered_json>(report_json);
@@ -131,6 +135,14 @@ UncertaintyTable ParseTable(std::string_view text, const std::string& where) {
   }
   table.camera_m = VectorAt(root, "camera_m", where);
   table.averaged_frames = IntegerAt(root, "averaged_frames", 1, 100000, where);
+  if (root.contains("limits")) {
+    const nlohmann::json& limits = root.at("limits");
+    const std::string inside = where + ", limits";
+    table.limits.least_fitness = NumberAt(limits, "least_fitness", 0.0, 1.0, inside);
+    table.limits.most_beyond = NumberAt(limits, "most_beyond", 0.0, 1.0, inside);
+    table.limits.most_seen_through = NumberAt(limits, "most_seen_through", 0.0, 1.0, inside);
+    table.limits.most_missing_m2 = NumberAt(limits, "most_missing_m2", 0.0, 100.0, inside);
+  }
   table.rules = ParseRules(root, "rules", table.axes.size(), where);
   table.plain_rules = ParseRules(root, "plain_rules", table.axes.size(), where);
   return table;

@@ -123,8 +123,8 @@ class Derivation {
     }
     if (uncertain_.empty())
       throw InputError("--uncertainty", "no axis is uncertain", "give three half widths, e.g. 6mm,6mm,4mm");
-    const std::string given =
-        options_.uncertainty_given ? "as given" : "assumed, for nothing was given (--uncertainty)";
+    const std::string given = options_.uncertainty_source.empty() ? "assumed, for nothing was given (--uncertainty)"
+                                                                  : options_.uncertainty_source;
     const std::string widths = fmt::format("+-({}) mm", Plain(Eigen::Vector3d(options_.uncertainty_m * 1000)));
     Add("feeler_axes", true, axes, fmt::format("position uncertain by {} along x, y, z, {}", widths, given));
     const CellChoice choice = ChooseCell(walls_, options_.uncertainty_m);
@@ -230,8 +230,48 @@ class Derivation {
     const double tilt = std::clamp(2 * mating_.clearance_m.minCoeff() / Depth(), 0.01, 0.05);
     Add("feeler_tolerance_angle", false, Plain(std::round(tilt * 1e4) * 1e-4),
         "clearance over depth, both sides, within 0.01 and 0.05");
+    ForceBudget();
     Add("feeler_cost", false, "1 0 0", "distance");
     Add("feeler_goal", true, "singleton", "one hypothesis left: the tightest a lattice tells");
+  }
+
+  /// What of the tool faces the target within kTip_m of its tip, m^2; the tool's width and depth there if no triangle
+  /// does (a point, a round end).
+  double TipArea() const {
+    constexpr double kTip_m = 5e-4;
+    double area_m2 = 0.0;
+    Box tip;
+    for (int t = 0; t < tool_mesh_.size(); ++t) {
+      const Box box = BoundsOf(tool_mesh_, t);
+      if (box.min().z() > tool_.min().z() + kTip_m) continue;
+      if (box.max().z() <= tool_.min().z() + kTip_m) {
+        area_m2 += std::max(0.0, -AreaVector(tool_mesh_, t).z());
+        tip.extend(box);
+      }
+    }
+    if (area_m2 > 0.0) return area_m2;
+    return tip.isEmpty() ? 1e-6 : std::max(1e-6, tip.sizes().x() * tip.sizes().y());
+  }
+
+  void ForceBudget() {
+    constexpr double kMost_n = 25.0;  // what public benchmarks of insertion allow
+    constexpr double kLeast_n = 6.0;  // 1.2 of what the force sensor tells contact by
+    constexpr double kShare = 0.2;    // of the yield pressure
+    const double tip_mm2 = 1e6 * TipArea();
+    const double yield_mpa = 1e-6 * options_.material.yield_pa;
+    const double bears_n = kShare * yield_mpa * tip_mm2;
+    const double budget_n = std::floor(std::clamp(bears_n, kLeast_n, kMost_n));
+    Add("feeler_force_budget", false, Plain(budget_n),
+        fmt::format(
+            "{:.0f} N at most, as benchmarks of insertion ask; a fifth of what {} yields at ({:g} MPa) over the "
+            "{:.1f} mm2 of the tip is {:.0f} N",
+            kMost_n, options_.material.name, yield_mpa, tip_mm2, bears_n));
+    if (bears_n < kLeast_n) {
+      result_.warnings.push_back(
+          fmt::format("the tip is small: {:.0f} N, the least that touch can do with, press {:.0f} MPa on it, and {} "
+                      "yields at {:g}",
+                      kLeast_n, kLeast_n / tip_mm2, options_.material.name, yield_mpa));
+    }
   }
 
   /// The part of the tool that fingers would hold.
@@ -295,10 +335,10 @@ class Derivation {
 }  // namespace
 
 Material ParseMaterial(const std::string& name) {
-  // Densities and friction from handbooks; the contact time is what keeps 1 ms steps stable, stiffer for metals.
-  const std::vector<Material> known = {{"aluminium", 2700, 0.3, 0.01}, {"steel", 7850, 0.2, 0.008},
-                                       {"brass", 8500, 0.25, 0.008},   {"abs", 1050, 0.3, 0.01},
-                                       {"nylon", 1150, 0.25, 0.012},   {"rubber", 1200, 0.8, 0.03}};
+  // Densities, friction and yield from handbooks; the contact time is what keeps 1 ms steps stable, stiffer for metals.
+  const std::vector<Material> known = {{"aluminium", 2700, 0.3, 0.01, 2.4e8}, {"steel", 7850, 0.2, 0.008, 2.5e8},
+                                       {"brass", 8500, 0.25, 0.008, 2e8},     {"abs", 1050, 0.3, 0.01, 4e7},
+                                       {"nylon", 1150, 0.25, 0.012, 5e7},     {"rubber", 1200, 0.8, 0.03, 5e6}};
   std::string names;
   for (const Material& material : known) {
     if (material.name == name) return material;

@@ -18,6 +18,7 @@ struct Material {
   double density_kg_m3 = 0.0;
   double friction = 0.3;         ///< against itself, sliding
   double contact_time_s = 0.01;  ///< MuJoCo's solref: the time in which an overlap is undone; short is stiff
+  double yield_pa = 0.0;         ///< pressure at which it gives way
 };
 /// aluminium, steel, brass, abs, nylon, rubber. Throws InputError listing them for another name.
 Material ParseMaterial(const std::string& name);
@@ -28,7 +29,7 @@ using Walls = std::array<std::vector<double>, 3>;
 struct NumberOptions {
   /// Half widths of the uncertainty, m; 0: the axis is certain.
   Eigen::Vector3d uncertainty_m{0.005, 0.005, 0.005};
-  bool uncertainty_given = false;
+  std::string uncertainty_source;  ///< where that is known from, a half sentence; empty: it is assumed
   Material material;
   std::map<std::string, std::string> overrides;  ///< field (feeler_...) -> value, as people give it
 };

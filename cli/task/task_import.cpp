@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <filesystem>
 #include <memory>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -20,6 +22,7 @@
 #include "feeler/core/file_output.h"
 #include "feeler/evaluation/cad_import/import_report.h"
 #include "feeler/evaluation/cad_import/import_task.h"
+#include "feeler/evaluation/cad_import/table_uncertainty.h"
 #include "feeler/evaluation/cad_import/trial.h"
 #include "feeler/workflow/check/task_check.h"
 
@@ -36,7 +39,6 @@ struct Flags {
   std::string target_pose;
   std::string mouth;
   std::string uncertainty;
-  std::string table;
   std::string material = "abs";
   std::vector<std::string> set;
   double deviation = 0.1;
@@ -110,6 +112,24 @@ std::map<std::string, std::string> ParseSettings(const std::vector<std::string>&
   return overrides;
 }
 
+/// Half widths, or a table that holds them.
+void SetUncertainty(const std::string& text, evaluation::ImportOptions& options) {
+  std::error_code error;
+  if (text.ends_with(".json") || std::filesystem::is_regular_file(text, error)) {
+    const evaluation::StatedUncertainty stated = evaluation::UncertaintyOfTable(text);
+    options.uncertainty_m = stated.half_m;
+    options.uncertainty_source = stated.source;
+    if (!stated.note.empty()) Note("{}: {}\n", text, stated.note);
+  } else {
+    options.uncertainty_m = ParseLengths("--uncertainty", text);
+    options.uncertainty_source = "as given";
+  }
+  if (options.uncertainty_m.minCoeff() < 0 || options.uncertainty_m.maxCoeff() > 0.064) {
+    throw InputError("--uncertainty", fmt::format("\"{}\" is not between 0 and 64 mm", text),
+                     "give half widths, e.g. 6mm,6mm,4mm");
+  }
+}
+
 evaluation::ImportOptions OptionsFrom(const Flags& flags) {
   evaluation::ImportOptions options;
   options.tool = flags.tool;
@@ -123,14 +143,7 @@ evaluation::ImportOptions OptionsFrom(const Flags& flags) {
   if (!flags.tool_pose.empty()) options.frame_T_tool = ParsePose("--tool-pose", flags.tool_pose);
   if (!flags.target_pose.empty()) options.frame_T_target = ParsePose("--target-pose", flags.target_pose);
   if (!flags.mouth.empty()) options.mouth_m = ParseLengths("--mouth", flags.mouth);
-  if (!flags.uncertainty.empty()) {
-    options.uncertainty_m = ParseLengths("--uncertainty", flags.uncertainty);
-    options.uncertainty_given = true;
-    if (options.uncertainty_m.minCoeff() < 0 || options.uncertainty_m.maxCoeff() > 0.064) {
-      throw InputError("--uncertainty", fmt::format("\"{}\" is not between 0 and 64 mm", flags.uncertainty),
-                       "give half widths, e.g. 6mm,6mm,4mm");
-    }
-  }
+  if (!flags.uncertainty.empty()) SetUncertainty(flags.uncertainty, options);
   options.material = flags.material;
   options.overrides = ParseSettings(flags.set);
   if (!(flags.deviation > 0 && flags.deviation < 1))
@@ -242,7 +255,8 @@ void AddTaskImport(CLI::App& task, Session& session) {
   command->add_option("--target-pose", flags->target_pose, "the same of the target, in the same frame");
   command->add_option("--mouth", flags->mouth, "x,y,z in the target's CAD frame: which mouth, where several fit");
   command->add_option("--uncertainty", flags->uncertainty,
-                      "half widths of where the target may be, e.g. 6mm,6mm,4mm; 0: certain");
+                      "half widths of where the target may be, e.g. 6mm,6mm,4mm; 0: certain; or an uncertainty table "
+                      "(feeler perceive calibrate)");
   command
       ->add_option("--material", flags->material,
                    "abs, aluminium, brass, nylon, rubber or steel: mass, friction and stiffness")

@@ -90,6 +90,7 @@ nlohmann::json ImportJson(const ImportOptions& options, const ImportedTask& task
             {"profile_pieces", ProfileJson(task.pieces_play)}}},
           {"material", options.material},
           {"uncertainty_m", Vector(options.uncertainty_m)},
+          {"uncertainty_from", options.uncertainty_source.empty() ? "assumed" : options.uncertainty_source},
           {"numbers", numbers},
           {"overrides", options.overrides},
           {"walls_m", walls},

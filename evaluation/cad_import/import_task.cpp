@@ -8,6 +8,7 @@
 #include <cmath>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "feeler/cad/align/alignment.h"
 #include "feeler/cad/mesh/mesh_tree.h"
@@ -233,8 +234,36 @@ void FindFlush(ImportedTask& task) {
                   axes, axes));
 }
 
+/// Parts whose play goes on shrinking all the way in.
+void DescribeTaper(const cad::Mating& mating, std::vector<std::string>& notes) {
+  const auto play_m = [&](double share) {
+    const auto at = std::min_element(mating.profile.begin(), mating.profile.end(), [&](const auto& a, const auto& b) {
+      return std::abs(a.depth_m - share * mating.depth_m) < std::abs(b.depth_m - share * mating.depth_m);
+    });
+    return at == mating.profile.end() ? 0.0 : at->half_m.minCoeff();
+  };
+  constexpr double kLess_m = 3e-6;
+  const double early_m = play_m(0.3);
+  const double middle_m = play_m(0.6);
+  const double late_m = play_m(0.9);
+  if (early_m - middle_m < kLess_m || middle_m - late_m < kLess_m) return;
+  notes.push_back(fmt::format(
+      "the parts taper: play a side falls from {:.3f} mm at 0.3 of the depth to {:.3f} at 0.6 and {:.3f} at "
+      "0.9; a weak spot: a tool that is tilted or aside wedges before the end, and how deep it goes depends "
+      "on force and friction",
+      1000 * early_m, 1000 * middle_m, 1000 * late_m));
+}
+
 void Describe(const ImportOptions& options, const cad::Alignment& alignment, ImportedTask& task) {
   const cad::Mating& mating = task.mating;
+  for (const auto& [role, part] : {std::pair{"tool", &task.tool}, {"target", &task.target}}) {
+    for (const std::string& mended : part->checked.mended) {
+      task.notes.push_back(fmt::format("{} ({}), mended: {}", role, part->file, mended));
+    }
+    for (const std::string& noted : part->checked.noted) {
+      task.notes.push_back(fmt::format("{} ({}): {}", role, part->file, noted));
+    }
+  }
   for (const std::string& note : alignment.notes) task.notes.push_back(note);
   if (mating.tool_has_opening) {
     task.notes.push_back(
@@ -243,6 +272,7 @@ void Describe(const ImportOptions& options, const cad::Alignment& alignment, Imp
   if (mating.through)
     task.notes.push_back(fmt::format(
         "the hole goes through: nothing stops the tool; inserted is {:.3f} mm below the mouth", 1000 * mating.depth_m));
+  DescribeTaper(mating, task.notes);
   if (mating.openings.empty())
     task.notes.push_back("no closed line around the opening was found at the mouth: there is no lid");
   for (const std::string& warning : task.content.numbers.warnings) task.notes.push_back(warning);
@@ -251,7 +281,7 @@ void Describe(const ImportOptions& options, const cad::Alignment& alignment, Imp
         "walls come as near as {:.3f} cells to lattice planes for every cell from 0.5 to 2 mm: outcomes may be misread",
         task.content.numbers.margin_cells));
   }
-  if (!options.uncertainty_given)
+  if (options.uncertainty_source.empty())
     task.notes.push_back("the uncertainty was not given: 5 mm to each side is assumed (--uncertainty)");
 }
 
@@ -288,7 +318,7 @@ ImportedTask ImportTask(const ImportOptions& given) {
   content.target_surface = task.target.placed;
   content.tool_volume = cad::VolumeOf(task.tool.placed);
   content.material = material;
-  const cad::NumberOptions numbers{options.uncertainty_m, options.uncertainty_given, material, options.overrides};
+  const cad::NumberOptions numbers{options.uncertainty_m, options.uncertainty_source, material, options.overrides};
   Stage(options, "numbers");
   // First with a cell that is as good as any: the walls it is chosen by are found on the pieces as MuJoCo has them.
   content.numbers = cad::DeriveNumbers(task.mating, task.tool.placed, task.target.placed, {}, numbers);

@@ -30,7 +30,7 @@ struct ImportOptions {
   std::optional<Pose> frame_T_target;
   std::optional<Eigen::Vector3d> mouth_m;  ///< in CAD coordinates of the target
   Eigen::Vector3d uncertainty_m{0.005, 0.005, 0.005};
-  bool uncertainty_given = false;
+  std::string uncertainty_source;  ///< where that is known from, a half sentence; empty: it is assumed
   std::string material = "abs";
   std::map<std::string, std::string> overrides;      ///< feeler_... -> value; kept from an earlier import
   double deviation_share = 0.1;                      ///< of the clearance, that pieces may deviate by where parts mate

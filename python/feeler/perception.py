@@ -36,6 +36,7 @@ class PosePerception:
 
         Returns:
             Result: ``found``, ``reason`` (why not), ``world_T_target``, ``fitness``, ``rms_m``, ``points``, ``covariance``;
+            what else speaks for and against it: ``explained``, ``beyond``, ``seen_through``, ``missing_m2``;
             with a table ``world_T_estimate`` (the centre of the hypotheses), ``counts`` and ``extents``, those of the
             smallest problem of the table's family that covers them.
         """

@@ -60,9 +60,8 @@ std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::stri
                                                                  const workflow::PlanningSetup& setup) {
   workflow::EpisodePerception perception;
   perception.table = workflow::LoadTable(table, setup.task(), env::Fingerprint(setup.model, env::Opening::kClosed));
-  workflow::PerceptionSettings settings;
-  settings.averaged_frames = perception.table.averaged_frames;
-  perception.finder = std::make_shared<const workflow::TargetFinder>(setup.model, settings);
+  perception.finder =
+      std::make_shared<const workflow::TargetFinder>(setup.model, workflow::SettingsOf(perception.table));
   return std::make_shared<const workflow::EpisodePerception>(std::move(perception));
 }
 

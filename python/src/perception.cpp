@@ -38,10 +38,11 @@ perception::Points ToPoints(const DoubleArray& cloud) {
 /// The finder of a task with its table, if it has one.
 class Finder {
  public:
-  Finder(PlanningTask& task, const std::string& table) : task_(task.model()), finder_(task_) {
-    if (table.empty()) return;
-    table_ = workflow::LoadTable(table, task_.task, env::Fingerprint(task_, env::Opening::kClosed));
-    family_ = workflow::FamilyOfTable(*table_, task_.task, table);
+  Finder(PlanningTask& task, const std::string& table)
+      : task_(task.model()),
+        table_(TableOf(task_, table)),
+        finder_(task_, table_ ? workflow::SettingsOf(*table_) : workflow::PerceptionSettings()) {
+    if (table_) family_ = workflow::FamilyOfTable(*table_, task_.task, table);
   }
 
   nb::dict Answer(const perception::Registration& found) const {
@@ -50,6 +51,9 @@ class Finder {
     d["reason"] = found.reason;
     d["fitness"] = found.fitness;
     d["explained"] = found.explained;
+    d["beyond"] = found.beyond;
+    d["seen_through"] = found.seen_through;
+    d["missing_m2"] = found.missing_m2;
     d["rms_m"] = found.rms_m;
     d["points"] = found.points;
     d["world_T_target"] = Eigen::Matrix4d(found.world_T_target.matrix());
@@ -68,9 +72,14 @@ class Finder {
   const workflow::TargetFinder& finder() const { return finder_; }
 
  private:
+  static std::optional<perception::UncertaintyTable> TableOf(const env::TaskModel& task, const std::string& table) {
+    if (table.empty()) return std::nullopt;
+    return workflow::LoadTable(table, task.task, env::Fingerprint(task, env::Opening::kClosed));
+  }
+
   env::TaskModel task_;
-  workflow::TargetFinder finder_;
   std::optional<perception::UncertaintyTable> table_;
+  workflow::TargetFinder finder_;
   planner::ProblemFamily family_;
 };
 

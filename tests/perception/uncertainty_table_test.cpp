@@ -26,6 +26,7 @@ UncertaintyTable EmptyTable() {
   table.axes = {{AxisKind::kX}, {AxisKind::kY}, {AxisKind::kZ}};
   table.camera_m = kCamera;
   table.averaged_frames = 10;
+  table.limits = {0.6, 0.07, 0.02, 0.0005};
   return table;
 }
 

@@ -35,11 +35,19 @@ nlohmann::ordered_json SettingsJson(const std::string& fingerprint, const Calibr
           {"version", FEELER_VERSION}};
 }
 
+nlohmann::ordered_json EvidenceJson(const perception::MatchEvidence& evidence) {
+  return {{"fitness", evidence.fitness},
+          {"explained", evidence.explained},
+          {"beyond", evidence.beyond},
+          {"seen_through", evidence.seen_through},
+          {"missing_m2", evidence.missing_m2}};
+}
+
 nlohmann::ordered_json ToJson(const CalibrationSample& sample) {
   return {{"index", sample.index},
           {"found", sample.found},
           {"distance_m", sample.distance_m},
-          {"fitness", sample.fitness},
+          {"evidence", EvidenceJson(sample.evidence)},
           {"cpu_s", sample.cpu_s},
           {"rejected", sample.rejected},
           {"true", PoseJson(sample.poses.world_T_true)},
@@ -60,7 +68,10 @@ CalibrationSample SampleFrom(const std::string& line, const std::string& path, c
   sample.index = json.at("index").get<std::int64_t>();
   sample.found = json.at("found").get<bool>();
   sample.distance_m = json.at("distance_m").get<double>();
-  sample.fitness = json.at("fitness").get<double>();
+  const nlohmann::json& evidence = json.at("evidence");
+  sample.evidence = {evidence.at("fitness").get<double>(), evidence.at("explained").get<double>(),
+                     evidence.at("beyond").get<double>(), evidence.at("seen_through").get<double>(),
+                     evidence.at("missing_m2").get<double>()};
   sample.cpu_s = json.at("cpu_s").get<double>();
   sample.rejected = json.at("rejected").get<int>();
   sample.poses.world_T_true = perception::PoseAt(json, "true", path);
@@ -144,7 +155,7 @@ CalibrationSample Take(CameraCell& cell, std::int64_t index, const CalibrationOp
       cell.Look(placement.world_T_target, options.seed, static_cast<std::uint64_t>(sample.installation), noise);
   sample.found = sight.registration.found;
   sample.distance_m = sight.distance_m;
-  sample.fitness = sight.registration.fitness;
+  sample.evidence = sight.registration;
   sample.cpu_s = sight.cpu_s;
   sample.rejected = placement.rejected;
   sample.poses = {sight.registration.world_T_target, placement.world_T_target, sample.installation};
@@ -167,6 +178,38 @@ std::vector<perception::PoseSample> Found(const std::vector<CalibrationSample>& 
     if (sample.found && sample.held_out == held_out) found.push_back(sample.poses);
   }
   return found;
+}
+
+/// Sets the limits of the table by one half of the poses and by the negatives, and judges all of them by it.
+void JudgeByEvidence(Calibration& calibration) {
+  std::vector<perception::MatchEvidence> matches;
+  for (const CalibrationSample& sample : calibration.samples) {
+    if (sample.found && !sample.held_out) matches.push_back(sample.evidence);
+  }
+  std::vector<perception::MatchEvidence> negatives;
+  for (const KnownNegative& negative : calibration.negatives) negatives.push_back(negative.evidence);
+  perception::MatchLimits& limits = calibration.table.limits;
+  limits = perception::LimitsFrom(matches, negatives);
+  for (CalibrationSample& sample : calibration.samples) {
+    sample.found = sample.found && limits.Allow(sample.evidence);
+    calibration.not_found += sample.found ? 0 : 1;
+  }
+  for (KnownNegative& negative : calibration.negatives) {
+    negative.found = negative.found && limits.Allow(negative.evidence);
+  }
+}
+
+nlohmann::ordered_json WorstJson(const Calibration& calibration) {
+  perception::MatchEvidence worst{1.0, 1.0, 0.0, 0.0, 0.0};
+  for (const CalibrationSample& sample : calibration.samples) {
+    if (!sample.found) continue;
+    worst.fitness = std::min(worst.fitness, sample.evidence.fitness);
+    worst.explained = std::min(worst.explained, sample.evidence.explained);
+    worst.beyond = std::max(worst.beyond, sample.evidence.beyond);
+    worst.seen_through = std::max(worst.seen_through, sample.evidence.seen_through);
+    worst.missing_m2 = std::max(worst.missing_m2, sample.evidence.missing_m2);
+  }
+  return EvidenceJson(worst);
 }
 
 double P95(std::vector<double> values) {
@@ -200,7 +243,9 @@ nlohmann::ordered_json ErrorsJson(const ErrorSummary& errors) {
 nlohmann::ordered_json NegativesJson(const std::vector<KnownNegative>& negatives) {
   nlohmann::ordered_json shown = nlohmann::ordered_json::array();
   for (const KnownNegative& n : negatives) {
-    shown.push_back({{"kind", n.kind}, {"what", n.what}, {"found", n.found}, {"fitness", n.fitness}});
+    nlohmann::ordered_json one = {{"kind", n.kind}, {"what", n.what}, {"found", n.found}};
+    one.update(EvidenceJson(n.evidence));
+    shown.push_back(std::move(one));
   }
   const auto found = std::count_if(negatives.begin(), negatives.end(), [](const auto& n) { return n.found; });
   return {{"shown", negatives.size()}, {"found", found}, {"each", std::move(shown)}};
@@ -291,7 +336,6 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
   for (const auto& sample : samples) {
     if (sample) calibration.samples.push_back(*sample);
   }
-  for (const CalibrationSample& sample : calibration.samples) calibration.not_found += sample.found ? 0 : 1;
   calibration.complete = calibration.samples.size() == samples.size() && !options.shard;
   if (!calibration.complete) return calibration;
   calibration.negatives = TryKnownNegatives(*finder, task_model, calibration.table.camera_m, options.cancellation);
@@ -300,6 +344,7 @@ Calibration Calibrate(const env::TaskModel& task_model, const CalibrationOptions
     return calibration;
   }
 
+  JudgeByEvidence(calibration);
   const std::vector<perception::PoseSample> made_from = Found(calibration.samples, false);
   const std::vector<perception::PoseSample> held_out = Found(calibration.samples, true);
   perception::FitRules(made_from, options.table, calibration.table);
@@ -354,6 +399,7 @@ ErrorSummary SummarizeErrors(const Calibration& calibration, bool correct) {
 std::string ReportJson(const Calibration& calibration, const CalibrationOptions& options) {
   nlohmann::ordered_json json = SettingsJson(calibration.table.fingerprint, options);
   json["not_found"] = calibration.not_found;
+  json["worst_match"] = WorstJson(calibration);
   json["negatives"] = NegativesJson(calibration.negatives);
   json["made_from"] = ScoreJson(calibration.made_from);
   json["held_out"] = ScoreJson(calibration.held_out);

@@ -42,7 +42,7 @@ struct CalibrationSample {
   int installation = 0;
   bool found = false;
   double distance_m = 0.0;
-  double fitness = 0.0;
+  perception::MatchEvidence evidence;
   double cpu_s = 0.0;
   int rejected = 0;
   perception::PoseSample poses;  ///< the estimate only if found

@@ -35,6 +35,13 @@ const Pose kAway = MakePose(Eigen::Vector3d(0.0, 0.0, -1000.0));
 
 }  // namespace
 
+PerceptionSettings SettingsOf(const perception::UncertaintyTable& table) {
+  PerceptionSettings settings;
+  settings.averaged_frames = table.averaged_frames;
+  settings.registration.limits = table.limits;
+  return settings;
+}
+
 TargetFinder::TargetFinder(const env::TaskModel& task_model, const PerceptionSettings& settings)
     : settings_(settings),
       model_(SurfaceOf(task_model, settings.model_spacing_m)),
@@ -59,7 +66,8 @@ perception::Registration TargetFinder::InDepth(const perception::DepthFrame& dep
                                                const perception::CameraIntrinsics& camera,
                                                const perception::DepthFrame* background) const {
   return perception::Register(Foreground(depth, camera, background), model_, nominal_orientation_,
-                              camera.world_T_camera.translation(), settings_.registration);
+                              camera.world_T_camera.translation(), settings_.registration,
+                              perception::ToPoints(depth, camera, settings_.cloud));
 }
 
 perception::Registration TargetFinder::InCloud(const perception::Points& scene, const Eigen::Vector3d& eye_m) const {
@@ -69,7 +77,7 @@ perception::Registration TargetFinder::InCloud(const perception::Points& scene, 
       points.push_back(p);
     }
   }
-  return perception::Register(points, model_, nominal_orientation_, eye_m, settings_.registration);
+  return perception::Register(points, model_, nominal_orientation_, eye_m, settings_.registration, scene);
 }
 
 perception::DepthFrame ToFrame(const env::DepthImage& image) { return {image.width, image.height, image.depth_m}; }

@@ -17,6 +17,7 @@
 #include "feeler/env/vision/depth_noise.h"
 #include "feeler/perception/depth_file.h"
 #include "feeler/perception/registration.h"
+#include "feeler/perception/uncertainty_table.h"
 #include "feeler/workflow/setup/placement_draw.h"
 
 namespace feeler::workflow {
@@ -32,6 +33,9 @@ struct PerceptionSettings {
   int averaged_frames = 10;
   double model_spacing_m = 0.0025;
 };
+
+/// As the table was made: so many frames a picture, and which matches are believed.
+PerceptionSettings SettingsOf(const perception::UncertaintyTable& table);
 
 /// Finds the target of a task in depth images and point clouds. Immutable; share it between threads.
 class TargetFinder {

@@ -1,11 +1,14 @@
 // Laws of an import from front to back: the folder loads as a task whose pieces have the clearance that was drawn; the
-// same input gives the same bytes; what is given on the command line stays when the part is imported again.
+// same input gives the same bytes; what is given on the command line stays when the part is imported again; what was
+// mended is stated; the force budget is a number of the task, with its reason, and less for a tip that bears less.
 #include "feeler/evaluation/cad_import/import_task.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "feeler/core/error.h"
 #include "feeler/env/model/task_file.h"
@@ -31,7 +34,7 @@ class ImportTaskTest : public testing::Test {
     options.target = files.target;
     options.out = folder_ / "task";
     options.uncertainty_m = {0.005, 0.005, 0.004};
-    options.uncertainty_given = true;
+    options.uncertainty_source = "as given";
     return options;
   }
   fs::path folder_;
@@ -70,6 +73,42 @@ TEST_F(ImportTaskTest, OverridesAreKept) {
   EXPECT_EQ(env::LoadTask(again.task_file.string()).task.axes[2].max_cells, 5);
   options.overrides["feeler_speling"] = "1";
   EXPECT_THROW(ImportTask(options), InputError);
+}
+
+/// Turns every triangle of a binary STL inside out.
+void TurnInsideOut(const std::string& file) {
+  std::string bytes = env::ReadTextFile(file);
+  constexpr std::size_t kHeader = 84;
+  constexpr std::size_t kTriangle = 50;
+  constexpr std::size_t kCorner = 12;
+  for (std::size_t at = kHeader; at + kTriangle <= bytes.size(); at += kTriangle) {
+    std::swap_ranges(bytes.begin() + static_cast<std::ptrdiff_t>(at + kCorner),
+                     bytes.begin() + static_cast<std::ptrdiff_t>(at + 2 * kCorner),
+                     bytes.begin() + static_cast<std::ptrdiff_t>(at + 2 * kCorner));
+  }
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST_F(ImportTaskTest, StatesWhatWasMendedAndTheForceBudget) {
+  ImportOptions options = OptionsFor("rectangle", "stl");
+  TurnInsideOut(options.tool);
+  const auto budget = [](const ImportedTask& task) {
+    const auto& fields = task.content.numbers.fields;
+    return *std::find_if(fields.begin(), fields.end(), [](const auto& f) { return f.field == "feeler_force_budget"; });
+  };
+  const ImportedTask task = ImportTask(options);
+  EXPECT_THAT(task.notes, testing::Contains(testing::AllOf(testing::HasSubstr("tool"), testing::HasSubstr("mended"),
+                                                           testing::HasSubstr("turned"))));
+  EXPECT_THAT(
+      task.notes,
+      testing::Not(testing::Contains(testing::AllOf(testing::HasSubstr("target ("), testing::HasSubstr("mended")))));
+  EXPECT_EQ(env::LoadTask(task.task_file.string()).task.force_budget_n, 25.0);
+  EXPECT_THAT(budget(task).reason, testing::HasSubstr("abs yields"));
+}
+
+TEST_F(ImportTaskTest, ATaperIsAWeakSpot) {
+  const ImportedTask task = ImportTask(OptionsFor("long-taper", "stl"));
+  EXPECT_THAT(task.notes, testing::Contains(testing::HasSubstr("taper")));
 }
 
 }  // namespace
