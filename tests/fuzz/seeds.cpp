@@ -70,7 +70,12 @@ std::string Table() {
   table.camera_m = {0.1, 0.2, 0.9};
   table.averaged_frames = 10;
   for (const double nearest : {0.5, 0.8}) {
-    table.rules.push_back({nearest, nearest + 0.3, {0.001, -0.002, 0.0}, Eigen::Vector2d(0.004, 0.006), 40});
+    table.rules.push_back({nearest,
+                           nearest + 0.3,
+                           {0.001, -0.002, 0.0},
+                           Eigen::Vector2d(0.004, 0.006),
+                           Eigen::Vector2d(0.002, 0.003),
+                           40});
   }
   table.plain_rules = table.rules;
   return perception::ToJson(table);

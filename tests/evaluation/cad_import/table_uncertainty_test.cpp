@@ -26,7 +26,7 @@ class TableUncertaintyTest : public testing::Test {
     for (const AxisKind kind : axes) table.axes.push_back({kind, 0.002, 1, 20});
     for (const Eigen::VectorXd& half : halves) {
       const auto near_m = static_cast<double>(table.rules.size());
-      table.rules.push_back({near_m, near_m + 1.0, Eigen::Vector3d::Zero(), half, 20});
+      table.rules.push_back({near_m, near_m + 1.0, Eigen::Vector3d::Zero(), half, 0.5 * half, 20});
     }
     table.plain_rules = table.rules;
     std::ofstream(file_) << perception::ToJson(table);
