@@ -165,7 +165,8 @@ void AddRow(const PomdpFamily& family, double epsilon, const json& cells, Experi
     }
   }
   const auto count = static_cast<double>(std::max<std::size_t>(1, cells.size()));
-  const double speedup = expansions[1] > 0.0 ? expansions[0] / expansions[1] : 0.0;
+  // One that experience solves without an expansion counts as one.
+  const double speedup = expansions[0] / std::max(expansions[1], 1.0);
   const double cpu_speedup = cpu_s[1] > 0.0 ? cpu_s[0] / cpu_s[1] : 0.0;
   const auto number = [](double x) { return std::isfinite(x) ? json(x) : json(); };
   result.table.rows.push_back({family.name, family.members.front().state_count(), cells.size(), epsilon,

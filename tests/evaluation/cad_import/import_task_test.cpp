@@ -106,10 +106,5 @@ TEST_F(ImportTaskTest, StatesWhatWasMendedAndTheForceBudget) {
   EXPECT_THAT(budget(task).reason, testing::HasSubstr("abs yields"));
 }
 
-TEST_F(ImportTaskTest, ATaperIsAWeakSpot) {
-  const ImportedTask task = ImportTask(OptionsFor("long-taper", "stl"));
-  EXPECT_THAT(task.notes, testing::Contains(testing::HasSubstr("taper")));
-}
-
 }  // namespace
 }  // namespace feeler::evaluation

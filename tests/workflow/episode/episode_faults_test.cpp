@@ -33,7 +33,10 @@ TEST(ParseFaults, CombinesNamesAndRefusesContradictions) {
     std::string name = noise.name;
     if (const std::size_t number = name.find("NUMBER"); number != std::string::npos) {
       EXPECT_THROW(ParseFaults(name), InputError) << name;
-      name.replace(number, std::string::npos, name.starts_with("stiffness") ? "20000" : "3");
+      name.replace(number, std::string::npos,
+                   name.starts_with("stiffness")    ? "20000"
+                   : name.starts_with("false-stop") ? "0.3"
+                                                    : "3");
     }
     if (const std::size_t range = name.find("FROM..TO"); range != std::string::npos) {
       EXPECT_THROW(ParseFaults(name), InputError) << name;
@@ -133,8 +136,8 @@ TEST(DrawWorld, FalseStopsAreCountedPerMetre) {
 
 TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
   const Task task = ThreeAxisTask();
-  const EpisodeFaults faults =
-      ParseFaults("latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6,port-stiffness=5..50,worn=-0.3..0.3");
+  const EpisodeFaults faults = ParseFaults(
+      "latency=2..8,contact-friction=0.1..0.6,slip=0..1,force-noise=1..6,port-stiffness=5..50,worn=-0.3..0.3");
   EXPECT_GE(faults.robot.contact_threshold_n, 40.0) << "a contact is told from the worst noise of the range";
   std::map<std::string, std::pair<double, double>> met;
   for (std::uint64_t k = 0; k < 200; ++k) {
@@ -155,12 +158,9 @@ TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
     // Every fault has a stream of its own.
     EXPECT_EQ(DrawWorld(task, ParseFaults("slip=0..1"), 0.3, 5, k).values.at("slip"), draw.values.at("slip"));
   }
-  const std::map<std::string, std::pair<double, double>> ranges = {{"latency", {2.0, 8.0}},
-                                                                   {"contact-friction", {0.1, 0.6}},
-                                                                   {"slip", {0.0, 1.0}},
-                                                                   {"force-noise", {1.0, 6.0}},
-                                                                   {"port-stiffness", {5.0, 50.0}},
-                                                                   {"worn", {-0.3, 0.3}}};
+  const std::map<std::string, std::pair<double, double>> ranges = {
+      {"latency", {2.0, 8.0}},     {"contact-friction", {0.1, 0.6}}, {"slip", {0.0, 1.0}},
+      {"force-noise", {1.0, 6.0}}, {"port-stiffness", {5.0, 50.0}},  {"worn", {-0.3, 0.3}}};
   ASSERT_EQ(met.size(), ranges.size());
   for (const auto& [name, range] : ranges) {
     const double width = range.second - range.first;
