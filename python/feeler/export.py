@@ -34,7 +34,7 @@ class Demonstrations:
         rewards: (rows,): 1 in the last row of an episode that inserted.
         terminated, truncated: (rows,) bool.
         times_s: (rows,): since the reset.
-        contact: (rows,) bool: the contact force exceeds 5 N.
+        contact: (rows,) bool: the contact force exceeded 5 N since the row before.
         motions: (rows,): which kind of motion of the executor was under way, index into ``MOTIONS``.
         hypotheses_left: (rows,): how many were possible when the action was taken.
         records: of the episodes.
@@ -122,9 +122,9 @@ def record(
         longest = np.maximum(sizes, 1.0)
         parts["actions"].append(np.hstack([steps / longest[:, :1], turns / longest[:, 1:]]).astype(np.float32))
         parts["clipped"].append((sizes > 1.0).any(axis=1))
-        contact = np.linalg.norm(seen[:, 19:22], axis=1) > 5.0
+        contact = track["contact"].astype(bool)
         seen = seen.copy()
-        seen[:, 31] = contact
+        seen[:, 31] = np.linalg.norm(seen[:, 19:22], axis=1) > 5.0
         parts["observations"].append(seen)
         last = np.zeros(len(seen), dtype=bool)
         last[-1] = True

@@ -21,7 +21,12 @@ struct Track {
   std::vector<double> observations, times_s;
   std::vector<std::uint8_t> motions;  ///< which kind of motion was under way: index into kMotions
   std::uint8_t motion = 0;
+  std::vector<std::uint8_t> contacts;  ///< whether something was felt since the row before
+  bool touched = false;
+  double next_s = 0.0;  ///< when the next row is due
 };
+/// A net force above this is a contact, N.
+constexpr double kContact_n = 5.0;
 constexpr const char* kMotions[] = {"transfer", "linear_move", "guarded", "compliant", "follow_twist"};
 
 void See(const env::SimulatedRobot& robot, Track& track) {
@@ -39,6 +44,15 @@ void See(const env::SimulatedRobot& robot, Track& track) {
   Saturate(row);
   track.times_s.push_back(robot.Time());
   track.motions.push_back(track.motion);
+  track.contacts.push_back(std::exchange(track.touched, false) ? 1 : 0);
+}
+
+/// At every physics step: contacts are shorter than a control step.
+void Watch(const env::SimulatedRobot& robot, double period_s, Track& track) {
+  track.touched = track.touched || robot.sensor().raw().force_n.norm() > kContact_n;
+  if (robot.Time() < track.next_s - 1e-9) return;
+  while (track.next_s <= robot.Time() + 1e-9) track.next_s += period_s;
+  See(robot, track);
 }
 
 /// Says which kind of motion is under way, and when the first transfer, to the start pose, is over.
@@ -103,7 +117,7 @@ nb::list RecordTracks(PlanningTask& task, const nb::object& policy, const std::s
     RunInterruptibly(token, [&] {
       workflow::EpisodeRunner runner(setup, workflow::BuildEpisodeScene(*setup), factory, options);
       env::SimulatedRobot& robot = runner.environment().robot();
-      robot.SetObserver([&](const env::World&) { See(robot, track); }, 1e-3 * control_steps);
+      robot.SetObserver([&](const env::World&) { Watch(robot, 1e-3 * control_steps, track); }, 1e-3);
       for (std::int64_t i = 0; i < episodes && !token.cancelled(); ++i) {
         track = Track();
         const workflow::EpisodeRecord record = runner.Run(static_cast<std::uint64_t>(first + i));
@@ -114,6 +128,7 @@ nb::list RecordTracks(PlanningTask& task, const nb::object& policy, const std::s
           nb::dict d;
           d["observations"] = NewArray(std::move(track.observations), {n, env::kObservationSize});
           d["times_s"] = NewArray(std::move(track.times_s), {n});
+          d["contact"] = NewArray(std::move(track.contacts), {n});
           d["motions"] = NewArray(std::move(track.motions), {n});
           d["record"] = ToPython(json);
           // Of the policy's own walk: how many hypotheses explain all answers so far, and since when.

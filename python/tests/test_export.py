@@ -24,7 +24,9 @@ def test_rows_lie_in_the_spaces(npz):
     space, actions = spaces.flat_observation_space(), spaces.action_space("control")
     assert len(data) == 2 and data.starts[-1] == len(data.observations)
     assert all(space.contains(row) for row in data.observations) and all(actions.contains(row) for row in data.actions)
-    assert data.rewards.sum() == sum(r.inserted for r in data.records) and data.contact.any()
+    assert data.rewards.sum() == sum(r.inserted for r in data.records)
+    # Contacts are told, however short: the policy's own, and the bottom of the opening.
+    assert all(data.contact[data.episode(k)].any() for k in range(len(data)))
 
 
 def test_actions_lead_to_the_next_row(npz):
