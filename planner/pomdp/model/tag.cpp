@@ -66,6 +66,7 @@ std::vector<SparseEntry> Flees(const Room& room, std::uint32_t robot, std::uint3
   along(room.cells[opponent].first - room.cells[robot].first, 1, 0);
   along(room.cells[opponent].second - room.cells[robot].second, 0, 1);
   std::vector<SparseEntry> row;
+  row.reserve(to.size());
   for (const auto& [cell, probability] : to) row.push_back({cell, probability});
   return row;
 }
