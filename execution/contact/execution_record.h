@@ -70,6 +70,7 @@ struct ExecutionRecord {
   std::array<double, kDirectionCount> force_excess = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
   /// A transfer met something where the policy knew of nothing: from then on transfers go as slowly as probes.
   bool careful = false;
+  int startled = 0;  ///< so many ways more, where the surprise was, keep the budget at edges, too
   std::vector<LadderRecord> ladder;
   double policy_cpu_s = 0.0;  ///< measured: belongs under `timing`
 };

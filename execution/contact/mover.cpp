@@ -18,6 +18,11 @@ constexpr double kUnwatched = 1e6;
 /// beside it.
 constexpr double kAcross = 0.1;
 constexpr double kAlong = 0.9;
+/// Ways after a surprise that are as slow as edges ask for: off it, and past it.
+constexpr int kStartled = 2;
+/// A target that stands higher than all hypotheses is met on the first way along the insertion, where contacts are
+/// hardest: this costs a tenth of a second.
+constexpr double kUnfelt_m_s = 0.08;
 
 }  // namespace
 
@@ -126,8 +131,12 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
   const Eigen::Vector3d way = target - position_;
   double speed_m_s = options_.transfer_speed_m_s;
   if (!way.isZero()) {
-    if (Careful()) {
+    if (unfelt_ && DirectionOf(way) == unfelt_) speed_m_s = std::min(speed_m_s, kUnfelt_m_s);
+    if (record_.startled > 0) {
+      --record_.startled;
       speed_m_s = std::min(speed_m_s, SpeedOfCarefulWay(way.normalized()));
+    } else if (Careful()) {
+      speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
     } else if (free_by == FreeBy::kEstimate) {
       speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
     }
@@ -138,7 +147,10 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
   // Where nothing was to be, or harder than it may be: the next transfer may meet it again, with more way to gain
   // speed.
   const bool unexpected = !predicted || record_.moves.back().peak_force_n > options_.force_budget_n;
-  record_.careful = record_.careful || (report.contact && unexpected);
+  if (report.contact && unexpected) {
+    record_.careful = true;
+    record_.startled = kStartled;
+  }
   return report;
 }
 

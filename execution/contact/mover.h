@@ -86,7 +86,13 @@ class Mover {
   /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".
   MotionReport Follow(const TwistMotion& motion);
   /// What is felt explains whatever a way has met: the ways from here on are known again.
-  void TrustAgain() { record_.careful = false; }
+  void TrustAgain() {
+    record_.careful = false;
+    record_.startled = 0;
+  }
+  /// Until a contact along the insertion, whose direction this is, has told how high the target stands, ways along it
+  /// are no faster than kUnfelt_m_s.
+  void KeepLowInto(std::optional<Direction> insertion) { unfelt_ = insertion; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
   Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
@@ -111,6 +117,7 @@ class Mover {
   Robot& robot_;
   const LatticeFrame& frame_;
   const ExecutorOptions& options_;
+  std::optional<Direction> unfelt_;
   ExecutionRecord& record_;
   double start_time_s_;
   double last_motion_end_s_;

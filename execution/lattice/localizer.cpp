@@ -78,6 +78,7 @@ bool Localizer::Tell(const Outcome& outcome) {
 }
 
 policies::Decision Localizer::Run() {
+  if (!face_felt_) mover_.KeepLowInto(task_.insertion);
   const double before = ThreadCpuSeconds();
   policy_.Begin(problem_);
   record_.policy_cpu_s += ThreadCpuSeconds() - before;
@@ -312,6 +313,7 @@ bool Localizer::Accept(const GuardedMove& move, const Touch& touch, const Outcom
       if (touch.direction == task_.insertion) {
         faces_known_ = face_felt_ && std::abs(touch.travelled - travel) < kAgree;
         face_felt_ = true;
+        mover_.KeepLowInto(std::nullopt);
       }
       anchor_[axis] = explains.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
