@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "feeler/cad/mesh/flat_points.h"
 #include "feeler/cad/mesh/mesh_tree.h"
 #include "feeler/core/error.h"
 
@@ -308,6 +309,7 @@ CheckedPart CheckPart(const TriangleMesh& mesh, const std::string& where) {
   std::vector<TriangleMesh> shells = ShellsOf(welded);
   for (const TriangleMesh& shell : shells) RequireNoSelfCut(shell, where);
   SortShells(std::move(shells), where, part);
+  for (TriangleMesh& solid : part.solids) solid = WithoutFlatPoints(solid);
   for (const TriangleMesh& solid : part.solids) Append(solid, part.mesh);
   if (part.solids.size() > 1) part.noted.push_back(fmt::format("{} solids", part.solids.size()));
   return part;

@@ -15,8 +15,8 @@ struct CheckedPart {
   std::vector<std::string> noted;    ///< what was found and left
 };
 
-/// Welds points, drops triangles without area and those that are there twice, turns shells that are seen from inside,
-/// and checks that the surface is closed: every edge is met from both sides, by one long edge or by several short ones.
+/// Welds points, drops triangles without area, those that are there twice and points that the shape does not need
+/// (flat_points.h), turns shells that are seen from inside, and checks that the surface is closed: every edge is met from both sides, by one long edge or by several short ones.
 /// `where` names the part in messages. Throws InputError with the place for a surface that is open, has no thickness,
 /// cuts itself, or is of no consistent orientation.
 CheckedPart CheckPart(const TriangleMesh& mesh, const std::string& where);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include "feeler/cad/mesh/mesh_tree.h"
@@ -143,7 +145,10 @@ double ColumnShare(const Box& a, const Box& b) {
 class Merger {
  public:
   Merger(std::vector<ConvexPiece> pieces, const MeshTree& solid, const DecomposeOptions& options)
-      : pieces_(std::move(pieces)), solid_(solid), options_(options) {}
+      : pieces_(std::move(pieces)), solid_(solid), options_(options), body_(pieces_.size()) {
+    std::iota(body_.begin(), body_.end(), std::size_t{0});
+    bodies_ = pieces_.size();
+  }
 
   std::vector<ConvexPiece> Run() {
     // First what stands on each other, so that wedges around a bore stay wedges; then side by side.
@@ -172,25 +177,38 @@ class Merger {
   }
 
   bool Unite(std::size_t i, std::size_t j) {
-    const ConvexPiece& a = pieces_[i];
-    const ConvexPiece& b = pieces_[j];
-    // Before the hull: a body that reaches far beyond both cannot be one with them.
+    if (apart_.contains({body_[i], body_[j]})) return false;
+    auto hull = OneBody(pieces_[i], pieces_[j]);
+    if (!hull) {
+      apart_.insert({body_[i], body_[j]});
+      return false;
+    }
+    pieces_[i] = std::move(*hull);
+    body_[i] = bodies_++;
+    pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(j));
+    body_.erase(body_.begin() + static_cast<std::ptrdiff_t>(j));
+    return true;
+  }
+
+  /// The hull of two where it is little more than both and stays in the solid.
+  std::optional<ConvexPiece> OneBody(const ConvexPiece& a, const ConvexPiece& b) const {
     std::vector<Eigen::Vector3d> points = a.surface.points;
     points.insert(points.end(), b.surface.points.begin(), b.surface.points.end());
     auto hull = HullOf(points);
-    if (!hull) return false;
+    if (!hull) return std::nullopt;
     const double more = hull->volume - a.volume - b.volume;
     const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull->surface) +
                            2e-3 * (a.volume + b.volume);
-    if (more > allowed || !StaysInside(*hull, solid_, options_)) return false;
-    pieces_[i] = std::move(*hull);
-    pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(j));
-    return true;
+    if (more > allowed || !StaysInside(*hull, solid_, options_)) return std::nullopt;
+    return hull;
   }
 
   std::vector<ConvexPiece> pieces_;
   const MeshTree& solid_;
   const DecomposeOptions& options_;
+  std::vector<std::size_t> body_;  ///< of each piece: its number, never used again when it is united with another
+  std::size_t bodies_ = 0;
+  std::set<std::pair<std::size_t, std::size_t>> apart_;  ///< pairs that were tried in vain
 };
 
 }  // namespace

@@ -118,6 +118,12 @@ double LargestDistance(const SlabPoint& p, const SlabPoint& a, const SlabPoint& 
                    DistanceToSegment(p.high, a.high, b.high)});
 }
 
+/// How far the convex hull of two edges of the part stands off the line between them in the middle of the slab: none
+/// where they lie in a plane, as on a prism or on a cone between two of its straight lines.
+double Twist(const SlabPoint& a, const SlabPoint& b) {
+  return DistanceToSegment(0.5 * (a.low + b.high), a.middle, b.middle);
+}
+
 using ToleranceAt = std::function<double(const SlabPoint&)>;
 
 /// Leaves out a corner when it and all that were left out beside it lie on the line between those that stay.
@@ -135,7 +141,7 @@ SlabLoop WithoutStraight(const SlabLoop& loop, const ToleranceAt& tolerance_at) 
   for (std::size_t i = 0; i < count && left > 3; ++i) {
     const std::size_t before = neighbour(i, count - 1);
     const std::size_t after = neighbour(i, 1);
-    bool straight = true;
+    bool straight = Twist(loop[before], loop[after]) <= kStraight * tolerance_at(loop[i]);
     for (std::size_t k = (before + 1) % count; k != after && straight; k = (k + 1) % count) {
       straight = LargestDistance(loop[k], loop[before], loop[after]) <= kStraight * tolerance_at(loop[k]);
     }
@@ -184,7 +190,12 @@ SlabLoop Simplified(const SlabLoop& original, const ToleranceAt& tolerance_at) {
         at = i;
       }
     }
-    if (worst <= 1) continue;
+    if (worst <= 1) {
+      const SlabPoint& from = loop[first % count];
+      const SlabPoint& to = loop[last % count];
+      if (last - first < 2 || Twist(from, to) <= std::min(tolerance_at(from), tolerance_at(to))) continue;
+      at = (first + last) / 2;
+    }
     keep[at % count] = true;
     spans.emplace_back(first, at);
     spans.emplace_back(at, last);

@@ -44,8 +44,9 @@ Slab SlabBetween(const TriangleMesh& mesh, double low_m, double high_m, double g
 std::vector<SlabLoop> SectionAt(const TriangleMesh& mesh, double height_m);
 
 /// Leaves out corners as long as no left-out one is farther than the tolerance from the line that stays, at either end
-/// of the slab and in its middle: first those that lie on a line with their neighbours, then the rest by the scheme of
-/// Douglas and Peucker (1973). `tolerance_at` gives the tolerance at a point, m.
+/// of the slab and in its middle, and two that stay lie in a plane within it: first those that lie on a line with their
+/// neighbours, then the rest by the scheme of Douglas and Peucker (1973). `tolerance_at` gives the tolerance at a
+/// point, m.
 SlabLoop Simplified(const SlabLoop& loop, const std::function<double(const SlabPoint&)>& tolerance_at);
 
 }  // namespace feeler::cad

@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <BRepMesh_Context.hxx>
+#include <BRepMesh_DelaunayBaseMeshAlgo.hxx>
+#include <BRepMesh_FaceDiscret.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepMesh_MeshAlgoFactory.hxx>
 #include <BRep_Tool.hxx>
+#include <IMeshTools_ModelAlgo.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Poly_Triangulation.hxx>
@@ -49,6 +54,41 @@ TriangleMesh MeshOf(const TopoDS_Shape& solid) {
   return mesh;
 }
 
+/// Straight lines run along planes, cylinders and cones from edge to edge: points within them add nothing to how near
+/// they are met, and Open CASCADE's grid on a cone is a hundred slabs to cut (cad/section).
+class NoPointsInside : public BRepMesh_MeshAlgoFactory {
+ public:
+  Handle(IMeshTools_MeshAlgo)
+      GetAlgo(const GeomAbs_SurfaceType type, const IMeshTools_Parameters& parameters) const override {
+    if (type == GeomAbs_Plane || type == GeomAbs_Cylinder || type == GeomAbs_Cone) {
+      return new BRepMesh_DelaunayBaseMeshAlgo;
+    }
+    return BRepMesh_MeshAlgoFactory::GetAlgo(type, parameters);
+  }
+};
+
+/// In the place of what puts such points on the seams of cones, and looks for triangles that an earlier run has left.
+class NoPointsOnSeams : public IMeshTools_ModelAlgo {
+ protected:
+  Standard_Boolean performInternal(const Handle(IMeshData_Model) & /*model*/,
+                                   const IMeshTools_Parameters& /*parameters*/,
+                                   const Message_ProgressRange& /*range*/) override {
+    return true;
+  }
+};
+
+/// Gives every face its triangles.
+void Triangulate(const TopoDS_Shape& shape, double deflection_mm, double angle_rad) {
+  const Handle(BRepMesh_Context) context = new BRepMesh_Context;
+  context->SetPreProcessor(new NoPointsOnSeams);
+  context->SetFaceDiscret(new BRepMesh_FaceDiscret(new NoPointsInside));
+  BRepMesh_IncrementalMesh mesh;
+  mesh.SetShape(shape);
+  mesh.ChangeParameters().Deflection = deflection_mm;
+  mesh.ChangeParameters().Angle = angle_rad;
+  mesh.Perform(context);
+}
+
 /// The name that the file gives the solid; empty where it gives none.
 std::string NameOf(STEPControl_Reader& reader, const TopoDS_Shape& solid) {
   const Handle(Standard_Transient) entity = reader.WS()->TransferReader()->EntityFromShapeResult(solid, 1);
@@ -69,7 +109,7 @@ RawPart ReadStep(const std::filesystem::path& file, double deflection_mm, double
     reader.TransferRoots();
     const TopoDS_Shape shape = reader.OneShape();
     if (shape.IsNull()) throw InputError(file.string(), "holds no shape", "export a solid");
-    BRepMesh_IncrementalMesh(shape, deflection_mm, Standard_False, angle_rad, Standard_False);
+    Triangulate(shape, deflection_mm, angle_rad);
     RawPart part{"STEP", {}, ParseUnit("mm")};  // the reader converts
     for (TopExp_Explorer solids(shape, TopAbs_SOLID); solids.More(); solids.Next()) {
       RawBody body{NameOf(reader, solids.Current()), MeshOf(solids.Current())};

@@ -120,7 +120,8 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
   const double clearance = mating.clearance_m.minCoeff();
   const double budget = options.deviation_share * clearance;
   const std::size_t facets = BoreFacets(mating);
-  const std::size_t most = facets > 24 ? std::min(kMostPiecesOfBore, facets + kMostPieces) : kMostPieces;
+  // A tapered bore has the sides of both its ends.
+  const std::size_t most = facets > 24 ? std::min(kMostPiecesOfBore, 2 * facets + kMostPieces) : kMostPieces;
   struct Tolerances {
     double near_m;
     double far_m;

@@ -135,9 +135,7 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
     if (record_.startled > 0) {
       --record_.startled;
       speed_m_s = std::min(speed_m_s, SpeedOfCarefulWay(way.normalized()));
-    } else if (Careful()) {
-      speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
-    } else if (free_by == FreeBy::kEstimate) {
+    } else if (record_.careful || free_by == FreeBy::kEstimate) {
       speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
     }
   }
@@ -223,8 +221,6 @@ double Mover::SpeedOfCarefulWay(const Eigen::Vector3d& way) const {
   return speed_m_s;
 }
 
-bool Mover::Careful() const { return record_.careful || !record_.ladder.empty(); }
-
 double Mover::SpeedInto(const Eigen::Vector3d& direction) const {
   const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
   const auto nearest = DirectionOf(direction);
@@ -239,7 +235,7 @@ MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> 
   motion.speed_m_s = options_.insertion_speed_m_s;
   const Eigen::Vector3d way = target - position_;
   if (!way.isZero()) motion.speed_m_s = std::min(motion.speed_m_s, SpeedInto(way.normalized()));
-  if (speed_m_s) motion.speed_m_s = Careful() ? std::min(*speed_m_s, motion.speed_m_s) : *speed_m_s;
+  if (speed_m_s) motion.speed_m_s = record_.careful ? std::min(*speed_m_s, motion.speed_m_s) : *speed_m_s;
   if (!rests) motion.rest_time_s = 0.0;
   motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);

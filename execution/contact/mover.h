@@ -108,8 +108,6 @@ class Mover {
   /// between them.
   double SpeedOfCarefulWay(const Eigen::Vector3d& way) const;
   void CheckLimits() const;
-  /// The world is not as the policy knows it: its plan has failed, or a transfer met something hard.
-  bool Careful() const;
   /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
   MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,
                       const PredictedCells& predicted, bool shortfall);

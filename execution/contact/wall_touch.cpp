@@ -15,6 +15,8 @@ namespace {
 /// A touch begins this far from the wall, in cells.
 constexpr double kNearestWall = 1.5;
 constexpr double kFarthestWall = 2.5;
+/// A tool that begins a touch stands off the wall by this at least, wherever it is, cells.
+constexpr double kOffWall = 0.25;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameTravel = 0.2;
 
@@ -64,7 +66,11 @@ std::optional<BroadWall> FindBroadWall(const planner::ContactMap& map, Direction
 
 std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vector3d& target, int orientation,
                                 const BroadWall& wall, int offset, double slack, const char* kind, Mover& mover) {
-  const Cell goal = wall.middle + offset * UnitCell(MakeDirection(wall.along, 1));
+  Cell goal = wall.middle + offset * UnitCell(MakeDirection(wall.along, 1));
+  while (map.Travel(goal, wall.direction, orientation) < slack + kOffWall &&
+         IsClear(map, goal - UnitCell(wall.direction), orientation)) {
+    goal -= UnitCell(wall.direction);
+  }
   const auto path =
       FindFreePath(map, NearestFree(map, mover.position() - target, orientation), EndAt(goal), orientation, true);
   if (!path) return std::nullopt;

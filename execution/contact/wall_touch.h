@@ -24,8 +24,9 @@ std::optional<BroadWall> FindBroadWall(const planner::ContactMap& map, Direction
                                        int orientation);
 
 /// Goes around a target believed at `target` (lattice coordinates) to the wall and touches it `offset` cells aside of
-/// its middle. Returns the coordinate of the tool at contact, along the axis of the touch; empty if no contact comes
-/// within `slack` cells of where the wall is expected, or one comes on the way. The tool is off the wall again.
+/// its middle, from farther off than that where the wall may be nearer by more: by `slack` cells, as it may be farther.
+/// Returns the coordinate of the tool at contact, along the axis of the touch; empty if none comes within that, or one
+/// comes on the way. The tool is off the wall again.
 std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vector3d& target, int orientation,
                                 const BroadWall& wall, int offset, double slack, const char* kind, Mover& mover);
 

@@ -12,6 +12,8 @@ namespace {
 
 /// Part of a wall's flat range, to both sides of its middle, in which a turned target is met by a corner of the tool.
 constexpr double kInnerPart = 0.42;
+/// The middle of a wall is met this near to where it is expected, cells.
+constexpr double kMiddleOff = 1.5;
 
 /// Coordinate at contact over the place along the wall, for a target turned by one radian.
 double SlopePerRadian(Direction insertion, int along, int axis) {
@@ -39,7 +41,8 @@ std::optional<YawFit> YawFromEvidence(const planner::ContactMap& map, Direction 
       if (!touch.contact || touch.is_oblique() || touch.direction != direction) continue;
       const Eigen::Vector3d place = touch.end() - target;
       const double t = place[wall->along] - middle;
-      if (std::abs(t) > kInnerPart * wall->half_range || std::abs(place[axis] - face) > 1.5) continue;
+      if (std::abs(t) > kInnerPart * wall->half_range) continue;
+      if (std::abs(place[axis] - face) > kMiddleOff + std::abs(t) * std::tan(kLargestTurn_rad)) continue;
       const double c = place[axis];
       n += 1.0;
       sum_t += t;
@@ -60,7 +63,6 @@ std::optional<YawFit> YawFromEvidence(const planner::ContactMap& map, Direction 
 
 std::optional<YawFit> MeasureYaw(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
                                  int orientation, Mover& mover, std::vector<Touch>& evidence) {
-  constexpr double kSlack = 2.0;
   constexpr int kLeastOffset = 2;
   std::optional<BroadWall> widest;
   double nearest = 0.0;
@@ -79,8 +81,10 @@ std::optional<YawFit> MeasureYaw(const Task& task, const planner::ContactMap& ma
   if (offset < kLeastOffset) return std::nullopt;
   const int axis = AxisOf(widest->direction);
   const double here = (mover.position() - target)[widest->along];
+  // Out here the wall stands nearer or farther by the turn.
+  const double slack = kMiddleOff + offset * std::tan(kLargestTurn_rad);
   for (const int side : {here < 0.0 ? -1 : 1, here < 0.0 ? 1 : -1}) {
-    const auto met = TouchWall(map, target, orientation, *widest, side * offset, kSlack, "yaw", mover);
+    const auto met = TouchWall(map, target, orientation, *widest, side * offset, slack, "yaw", mover);
     if (!met) return std::nullopt;
     Touch touch;
     touch.direction = widest->direction;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "feeler/planner/contact/contact_map.h"
 
 namespace feeler::execution {
+
+/// More than a confirming touch tells; a target that is turned farther was not the one that was felt.
+inline constexpr double kLargestTurn_rad = 8.0 * std::numbers::pi / 180.0;
 
 /// How far the target is turned about the insertion axis (right-handed about the direction out of the opening), against
 /// the frame of the evidence.

@@ -29,8 +29,6 @@ constexpr int kRetries = 2;
 constexpr double kDegree = std::numbers::pi / 180.0;
 /// A turn smaller than this is not worth turning the frame for.
 constexpr double kSmallestTurn_rad = 0.2 * kDegree;
-/// More than a confirming touch tells; a target that is turned farther was not the one that was felt.
-constexpr double kLargestTurn_rad = 8.0 * kDegree;
 /// Turns that are tried lie this many tolerances apart: each catches what is within one of it, and a little overlaps.
 constexpr double kSweepStep = 1.5;
 /// Beyond this a turn shows in the readings.
@@ -53,6 +51,7 @@ Cell CellsBeyond(const Task& task) {
 
 void Log(const Episode& episode, const char* rung, std::string reason) {
   episode.record.ladder.push_back({rung, std::move(reason)});
+  episode.record.careful = true;  // the plan has failed: until touches explain it, no way is known to be free
 }
 
 Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
@@ -149,6 +148,7 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
   const double yaw_rad = std::abs(fit->yaw_rad) < kSmallestTurn_rad ? 0.0 : fit->yaw_rad;
   const LatticeFrame turned = TurnedFrame(attempt.frame, task.insertion, *attempt.target, yaw_rad);
   Mover turned_mover = MoverFor(episode, turned);
+  turned_mover.TrustAgain();  // the turn is what was not known
   const auto centre = Recenter(task, map, Eigen::Vector3d::Zero(), attempt.orientation, turned_mover);
   if (!centre) {
     attempt.end = AttemptEnd::kLost;

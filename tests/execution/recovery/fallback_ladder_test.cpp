@@ -206,7 +206,7 @@ TEST(FallbackLadder, SameAnswersSameRecord) {
 
 TEST(YawFit, EqualsTheYawOfTheWorld) {
   const Task task = HousingTask();
-  for (const double degrees : {-3.0, -1.0, 0.0, 0.5, 2.0, 3.0}) {
+  for (const double degrees : {-5.0, -3.0, -1.0, 0.0, 0.5, 2.0, 4.5, 5.0}) {
     const Pose truth = MakePose({0.0004, -0.0003, 0.0}, degrees * kDegree);
     const LatticeFrame frame{Pose::Identity(), Eigen::Vector3d::Zero(), task.cell_m};
     KinematicRobot robot(HousingOverPanel(), task, truth, MakePose({0.0, 0.0, 0.02}), {}, RandomStream(3, 1, "robot"));
