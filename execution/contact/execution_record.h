@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/direction.h"
@@ -68,11 +69,18 @@ struct ExecutionRecord {
   /// Greatest force met over the force that the robot's word predicts, per direction, at least 1: from the first
   /// contact above the budget on, probes in that direction are slower by it.
   std::array<double, kDirectionCount> force_excess = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
-  /// A transfer met something where the policy knew of nothing: from then on transfers go as slowly as probes.
+  /// A transfer met something where the policy knew of nothing, or the plan has failed: transfers go as slowly as
+  /// probes until touches explain what was met.
   bool careful = false;
   int startled = 0;  ///< so many ways more, where the surprise was, keep the budget at edges, too
   std::vector<LadderRecord> ladder;
   double policy_cpu_s = 0.0;  ///< measured: belongs under `timing`
+
+  /// The plan has failed: another rung is tried.
+  void FallBack(const char* rung, std::string why) {
+    ladder.push_back({rung, std::move(why)});
+    careful = true;
+  }
 };
 
 }  // namespace feeler::execution

@@ -15,8 +15,8 @@ constexpr double kReach = 1.25;
 /// Out of the opening the tool stands this far above the highest mouth, in cells.
 constexpr double kAbove = 2.0;
 
-/// A wall of the opening is felt for up to this many shortfalls behind where the tolerance says it stands.
-constexpr double kBehindWall = 5.0;
+/// Of a motion that is to meet a wall of the opening, shortfalls behind where that may stand.
+constexpr double kBehindWall = 4.0;
 
 std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Problem& problem,
                                             const Eigen::Vector3d& tool) {
@@ -40,9 +40,7 @@ constexpr MayMeet kInside{.long_wall = true, .edge_towards = std::nullopt};
 
 /// Middle between the walls on both sides along `axis`; empty if one is missing. The tool ends in the middle.
 std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& mover) {
-  // What the clearance allows is at least the tolerance; a wall is told at the latest by the shortfall of a motion that
-  // goes on well behind it.
-  const double range = mover.Cells(2.0 * task.tolerance.lateral_m + kBehindWall * mover.options().shortfall_m);
+  const double range = FarthestWallInside(task, mover) + mover.Cells(kBehindWall * mover.options().shortfall_m);
   const Eigen::Vector3d begun = mover.position();
   std::array<double, 2> walls{};
   for (const int sign : {1, -1}) {
@@ -77,6 +75,10 @@ std::optional<Eigen::Vector3d> StepAside(const planner::ContactMap& map, Directi
 }
 
 }  // namespace
+
+double FarthestWallInside(const Task& task, const Mover& mover) {
+  return mover.Cells(2.0 * task.tolerance.lateral_m + mover.options().shortfall_m);
+}
 
 bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool) {
   return !MouthsOverTool(task, problem, tool).empty();

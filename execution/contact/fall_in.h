@@ -13,6 +13,10 @@ namespace feeler::execution {
 /// mouth over the tool (across the insertion within a cell and a quarter), less deep than the insertion.
 bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool);
 
+/// A tool that stands inside has a wall of the opening no farther off than this, in cells: what the clearance allows is
+/// at least the tolerance, and a motion that falls short of its end by less tells of no wall.
+double FarthestWallInside(const Task& task, const Mover& mover);
+
 /// Policies are planned with the opening closed; the real one is open. A tool that fell in is localized better than by
 /// any probe: it feels the walls of the opening on both sides of both axes across the insertion, then comes out and
 /// touches the face beside the mouth. Returns the position of the target (lattice coordinates), or nothing if there

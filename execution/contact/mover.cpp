@@ -20,6 +20,8 @@ constexpr double kAcross = 0.1;
 constexpr double kAlong = 0.9;
 /// Ways after a surprise that are as slow as edges ask for: off it, and past it.
 constexpr int kStartled = 2;
+/// Of the budget: a force that stops a compliant motion rises on until the robot has stopped.
+constexpr double kPressShare = 0.95;
 /// A target that stands higher than all hypotheses is met on the first way along the insertion, where contacts are
 /// hardest: this costs a tenth of a second.
 constexpr double kUnfelt_m_s = 0.08;
@@ -135,8 +137,8 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
     if (record_.startled > 0) {
       --record_.startled;
       speed_m_s = std::min(speed_m_s, SpeedOfCarefulWay(way.normalized()));
-    } else if (record_.careful || free_by == FreeBy::kEstimate) {
-      speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized()));
+    } else if (record_.careful || free_by != FreeBy::kBelief) {
+      speed_m_s = std::min(speed_m_s, SpeedInto(way.normalized(), free_by == FreeBy::kInside));
     }
   }
   const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
@@ -221,11 +223,12 @@ double Mover::SpeedOfCarefulWay(const Eigen::Vector3d& way) const {
   return speed_m_s;
 }
 
-double Mover::SpeedInto(const Eigen::Vector3d& direction) const {
+double Mover::SpeedInto(const Eigen::Vector3d& direction, bool held) const {
   const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
   const auto nearest = DirectionOf(direction);
   const double excess = nearest ? record_.force_excess[static_cast<std::size_t>(*nearest)] : 1.0;
-  return SpeedWithinBudget(robot_.Contact(in_world), options_.force_budget_n) / excess;
+  const ContactResponse wall = robot_.Contact(in_world);
+  return SpeedWithinBudget(held ? wall.Held() : wall, options_.force_budget_n) / excess;
 }
 
 MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s, bool rests) {
@@ -237,7 +240,7 @@ MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> 
   if (!way.isZero()) motion.speed_m_s = std::min(motion.speed_m_s, SpeedInto(way.normalized()));
   if (speed_m_s) motion.speed_m_s = record_.careful ? std::min(*speed_m_s, motion.speed_m_s) : *speed_m_s;
   if (!rests) motion.rest_time_s = 0.0;
-  motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
+  motion.force_limit_n = std::min(options_.insertion_force_limit_n, kPressShare * options_.force_budget_n);
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);
 }
 
@@ -246,7 +249,7 @@ MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double
   CompliantMotion motion;
   for (const Eigen::Vector3d& place : way_points) motion.world_T_tool.push_back(frame_.ToWorld(place));
   motion.speed_m_s = speed_m_s;
-  motion.force_limit_n = std::min(options_.insertion_force_limit_n, options_.force_budget_n);
+  motion.force_limit_n = std::min(options_.insertion_force_limit_n, kPressShare * options_.force_budget_n);
   const MotionReport report = Finish(robot_.Compliant(motion), way_points.back(), kind, {}, false);
   position_ = report.end;  // what it is pressed against, not the command, says where it is
   return report;

@@ -46,8 +46,9 @@ struct MayMeet {
 
 /// What says that a way is free.
 enum class FreeBy {
-  kBelief,   ///< no hypothesis left blocks it, or what is felt has pinned the target
-  kEstimate  ///< a fit to touches that are not yet confirmed: what it meets is to be met within the budget
+  kBelief,    ///< no hypothesis left blocks it, or what is felt has pinned the target
+  kEstimate,  ///< a fit to touches that are not yet confirmed: what it meets is to be met within the budget
+  kInside     ///< nothing, where the tool may stand in the opening: the same, of walls that hold it along its length
 };
 
 /// Moves the tool in lattice coordinates, with the orientation of the estimate, and writes every motion into the
@@ -79,8 +80,9 @@ class Mover {
   /// Compliantly from here straight to `target`, at the speed of an insertion or `speed_m_s`, until the tool rests or,
   /// where it goes on at once, until it should be there.
   MotionReport Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s = {}, bool rests = true);
-  /// How fast the tool may meet a wall in this direction (unit vector, lattice axes) as it stands, m/s.
-  double SpeedInto(const Eigen::Vector3d& direction) const;
+  /// How fast the tool may meet a wall in this direction (unit vector, lattice axes) as it stands, m/s; one that holds
+  /// it along its length if `held`.
+  double SpeedInto(const Eigen::Vector3d& direction, bool held = false) const;
   /// Compliantly through way points, pressing on what is under the tool.
   MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
   /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".

@@ -97,8 +97,7 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
 }
 
 std::optional<Eigen::Vector3d> Recenter(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
-                                        int orientation, Mover& mover) {
-  constexpr double kSlack = 1.25;
+                                        int orientation, double slack, Mover& mover) {
   Eigen::Vector3d centre = target;
   for (int axis = 0; axis < 3; ++axis) {
     if (axis == AxisOf(task.insertion)) continue;
@@ -108,7 +107,7 @@ std::optional<Eigen::Vector3d> Recenter(const Task& task, const planner::Contact
       const Direction direction = MakeDirection(axis, sign);
       const auto wall = FindBroadWall(map, task.insertion, direction, orientation);
       if (!wall) continue;
-      const auto met = TouchWall(map, centre, orientation, *wall, 0, kSlack, "confirm", mover);
+      const auto met = TouchWall(map, centre, orientation, *wall, 0, slack, "confirm", mover);
       if (!met) return std::nullopt;
       const double expected = centre[axis] + wall->middle[axis] + map.phase()[axis] +
                               sign * static_cast<double>(map.Travel(wall->middle, direction, orientation));

@@ -179,7 +179,7 @@ void Localizer::Flush() {
     const double from = mover_.position()[axis];
     const Eigen::Vector3d target = Station();
     const double cells = SignOf(direction) * (target[axis] - from);
-    const MotionReport report = mover_.Fast(target, "transfer", std::array<double, 2>{cells, cells});
+    const MotionReport report = FastFree(target, std::array<double, 2>{cells, cells});
     const Touch touch = MakeTouch(direction, from, report);
     evidence_.push_back(touch);
     if (!report.contact) break;
@@ -199,6 +199,7 @@ void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
   while (true) {
     const Eigen::Vector3d begun = mover_.position();
     const Touch touch = ProbeAlong(move, now);
+    went_in_ = move.direction == task_.insertion;
     evidence_.push_back(touch);
     pending_.reset();
     if (TakeOver(move, touch, tolerance)) {
@@ -238,7 +239,7 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   if (FastIsWorth(move.direction, fast + behind)) {
     Eigen::Vector3d target = station;
     target[axis] += sign * fast;
-    const MotionReport report = mover_.Fast(target, "transfer", predicted);
+    const MotionReport report = FastFree(target, predicted);
     if (report.contact) {
       // A contact at speed is read late: come off and feel again slowly.
       mover_.Retreat(report.end - UnitVector(move.direction));
@@ -374,6 +375,25 @@ void Localizer::LogDecision(const GuardedMove& move, const Outcome& outcome, int
     decision.left.push_back(static_cast<int>(index++));
   }
   record_.decisions.push_back(std::move(decision));
+}
+
+MotionReport Localizer::FastFree(const Eigen::Vector3d& target, const PredictedCells& predicted) {
+  const Eigen::Vector3d begun = mover_.position();
+  Eigen::Vector3d across = target - begun;
+  const double inward = across[AxisOf(task_.insertion)] * SignOf(task_.insertion);
+  across[AxisOf(task_.insertion)] = 0.0;
+  if (across.norm() < kSamePlace) {
+    went_in_ = went_in_ || inward > 0.0;
+    return mover_.Fast(target, "transfer", predicted);
+  }
+  const double slow = FarthestWallInside(task_, mover_);
+  if (went_in_ && slow < (target - begun).norm() && MayHaveFallenIn(task_, problem_, begun)) {
+    const Eigen::Vector3d first = begun + slow * (target - begun).normalized();
+    const MotionReport report = mover_.Fast(first, "transfer", std::array<double, 2>{slow, slow}, FreeBy::kInside);
+    if (report.contact) return report;
+  }
+  went_in_ = false;
+  return mover_.Fast(target, "transfer", predicted);
 }
 
 bool Localizer::FoundInside() {

@@ -85,6 +85,9 @@ class Localizer {
   int CountOutcomes(const GuardedMove& move) const;
   /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
   bool FoundInside();
+  /// Fast to a place that the belief knows a free way to. The opening is closed to the belief: the first way across
+  /// after one along the insertion begins slowly where the tool may have slipped in, up to where its walls would be.
+  MotionReport FastFree(const Eigen::Vector3d& target, const PredictedCells& predicted);
   /// Shifts the lattice if an edge near by explains the touch; throws ExecutionFailure if none does.
   void ShiftOffEdge(const Touch& touch);
   void RetreatFromContact(Direction direction);
@@ -101,6 +104,7 @@ class Localizer {
   Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
   bool face_felt_ = false;    ///< there was a contact along the insertion
   bool faces_known_ = false;  ///< the last one was where the one before it had put it
+  bool went_in_ = false;      ///< along the insertion, and not yet across it
   bool lifted_ = false;       ///< the tool stands kRim above Station(), off what may be a lead-in
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
   std::optional<Eigen::Vector3d> found_inside_;

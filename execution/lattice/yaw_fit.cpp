@@ -57,6 +57,7 @@ std::optional<YawFit> YawFromEvidence(const planner::ContactMap& map, Direction 
     if (best && best->baseline_cells >= greatest - least) continue;
     const double slope = (n * sum_tc - sum_t * sum_c) / spread;
     best = YawFit{std::atan(slope / SlopePerRadian(insertion, wall->along, axis)), greatest - least};
+    best->middle[axis] = (sum_c - slope * sum_t) / n - face;
   }
   return best;
 }

@@ -20,7 +20,8 @@ inline constexpr double kLargestTurn_rad = 8.0 * std::numbers::pi / 180.0;
 /// the frame of the evidence.
 struct YawFit {
   double yaw_rad = 0.0;
-  double baseline_cells = 0.0;  ///< between the outermost places of the wall that tells
+  double baseline_cells = 0.0;                       ///< between the outermost places of the wall that tells
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< of the target by that wall, against where it was believed
 };
 
 /// The yaw from contacts with the same square wall at different places: a wall that is turned is met deeper on one

@@ -92,7 +92,7 @@ class PoseAttempt {
       record.believed_localized = true;
       record.world_T_estimate = frame_.world_T_estimate * ToPose(pose);
       if (insertion == 0) record.localization_time_s = episode_.robot.Time() - episode_.started_s;
-      if (insertion > 0) record.ladder.push_back({"touch again", reason});
+      if (insertion > 0) record.FallBack("touch again", reason);
       const BelievedInsertion verdict = Insert(*record.world_T_estimate);
       record.believed_inserted = verdict.inserted;
       reason = verdict.reason;

@@ -33,6 +33,8 @@ constexpr double kSmallestTurn_rad = 0.2 * kDegree;
 constexpr double kSweepStep = 1.5;
 /// Beyond this a turn shows in the readings.
 constexpr double kSweepMost_rad = 6.0 * kDegree;
+/// The middle of a target that is not turned is felt this near to where it is believed, cells.
+constexpr double kCentreOff = 1.25;
 /// Of a start belief along an axis, as problems are made for.
 constexpr int kMostCells = 64;
 /// The tool comes off the mouth by this before it goes elsewhere, cells.
@@ -50,8 +52,7 @@ Cell CellsBeyond(const Task& task) {
 }
 
 void Log(const Episode& episode, const char* rung, std::string reason) {
-  episode.record.ladder.push_back({rung, std::move(reason)});
-  episode.record.careful = true;  // the plan has failed: until touches explain it, no way is known to be free
+  episode.record.FallBack(rung, std::move(reason));
 }
 
 Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
@@ -149,7 +150,9 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
   const LatticeFrame turned = TurnedFrame(attempt.frame, task.insertion, *attempt.target, yaw_rad);
   Mover turned_mover = MoverFor(episode, turned);
   turned_mover.TrustAgain();  // the turn is what was not known
-  const auto centre = Recenter(task, map, Eigen::Vector3d::Zero(), attempt.orientation, turned_mover);
+  // What was felt before on one side of the middle was farther or nearer by the turn.
+  const double slack = kCentreOff + 0.5 * fit->baseline_cells * std::tan(std::abs(yaw_rad));
+  const auto centre = Recenter(task, map, fit->middle, attempt.orientation, slack, turned_mover);
   if (!centre) {
     attempt.end = AttemptEnd::kLost;
     attempt.reason = "yaw fit: the sides of the target are not where they should be";
@@ -191,11 +194,12 @@ void Spiral(const Episode& episode, const planner::Problem& problem, Attempt& at
            attempt);
 }
 
-void TryAtMouth(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
+/// Carries out a rung on an insertion that is blocked.
+void AtMouth(void (*rung)(const Episode&, const planner::Problem&, Attempt&), const Episode& episode,
+             const planner::Problem& problem, Attempt& attempt) {
+  if (attempt.end != AttemptEnd::kBlocked) return;
   try {
-    FitYaw(episode, problem, attempt);
-    if (attempt.end == AttemptEnd::kBlocked) SweepYaw(episode, problem, attempt);
-    if (attempt.end == AttemptEnd::kBlocked) Spiral(episode, problem, attempt);
+    rung(episode, problem, attempt);
   } catch (const LostTrack& lost) {
     attempt.end = AttemptEnd::kLost;
     attempt.reason = lost.what();
@@ -261,9 +265,14 @@ std::string ClimbLadder(const Episode& episode, const planner::Problem& problem,
   std::shared_ptr<OnlinePlanner> planner = episode.options.online_planner;
   if (!planner) planner = std::make_shared<OnlinePlanner>();
   for (int retry = 0;; ++retry) {
-    // A blocked insertion at a place that every touch agrees on needs no other place.
-    if (!(attempt.end == AttemptEnd::kBlocked && attempt.sure)) Refit(episode, problem, attempt);
-    if (attempt.end == AttemptEnd::kBlocked) TryAtMouth(episode, problem, attempt);
+    // First what takes no other place to be right: touches of a turned target do not agree on one, either.
+    AtMouth(FitYaw, episode, problem, attempt);
+    if (attempt.end == AttemptEnd::kLost) {
+      Refit(episode, problem, attempt);
+      AtMouth(FitYaw, episode, problem, attempt);
+    }
+    AtMouth(SweepYaw, episode, problem, attempt);
+    AtMouth(Spiral, episode, problem, attempt);
     if (attempt.end == AttemptEnd::kInserted) return attempt.reason;
     if (retry == kRetries) break;
 

@@ -23,9 +23,11 @@ inline constexpr const char* kGiveUp = "give up";
 /// What is tried when an attempt has failed, until the tool is inserted or nothing is left to try:
 ///
 ///   repeat three times:
-///     refit over the touches of the attempt, in the start belief and around it (a quarter of the task's uncertainty)
-///     if it is narrow enough: confirm and insert
-///     if the insertion is blocked: yaw fit; yaw sweep; spiral
+///     if the insertion is blocked: yaw fit
+///     if the target is not there:
+///       refit over the touches of the attempt, in the start belief and around it (a quarter of the task's uncertainty)
+///       if it is narrow enough: confirm and insert; if that is blocked: yaw fit
+///     if the insertion is blocked: yaw sweep; spiral
 ///     new attempt: first with the hypotheses around the refit, then with the whole cuboid and a margin
 ///   give up
 ///

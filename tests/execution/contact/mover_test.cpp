@@ -154,7 +154,7 @@ TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
 
 TEST(Mover, RecoveryKeepsWithinTheBudgetFromItsStart) {
   Bench bench(1.0);
-  bench.record.ladder.push_back({"refit", "off the policy tree"});
+  bench.record.FallBack("refit", "off the policy tree");
   Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
   mover.Fast({4.0, 0.0, 0.0}, "transfer");
   EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
