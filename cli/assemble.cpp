@@ -26,7 +26,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct AssembleFlags {
   std::string assembly;
   std::vector<std::string> databases;
   std::uint64_t seed = 1;
@@ -41,7 +41,7 @@ struct Flags {
   bool json = false;
 };
 
-void RequireSane(const Flags& flags) {
+void RequireSane(const AssembleFlags& flags) {
   if (!flags.video.empty() && flags.builds > 1) {
     throw InputError("--video", "shows one build", "leave out --builds");
   }
@@ -92,7 +92,7 @@ nlohmann::json RateJson(const evaluation::Rate& rate) {
           {"high", rate.high}};
 }
 
-void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
+void PrintSummary(const AssembleFlags& flags, const workflow::Assembly& assembly,
                   const std::vector<workflow::AssemblyRecord>& records, const Session& session) {
   const workflow::AssemblySummary summary = workflow::Summarize(records);
   const evaluation::Rate complete = evaluation::WilsonRate(summary.complete, summary.builds);
@@ -133,7 +133,7 @@ void PrintSummary(const Flags& flags, const workflow::Assembly& assembly,
 }
 
 /// What all ranks must agree on.
-std::string RankIdentity(const Flags& flags) {
+std::string RankIdentity(const AssembleFlags& flags) {
   nlohmann::json json = {{"command", "assemble"},
                          {"version", FEELER_VERSION},
                          {"assembly", flags.assembly},
@@ -145,7 +145,7 @@ std::string RankIdentity(const Flags& flags) {
   return json.dump();
 }
 
-void Run(const CLI::App& command, const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const AssembleFlags& flags, Session& session) {
   if (!session.serves()) RequireSane(flags);
   if (session.ranks != nullptr && (flags.check || !flags.video.empty() || !flags.render.empty())) {
     throw InputError("ranks", "a check, a picture and a video are work for one", "start it without mpirun");
@@ -224,7 +224,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 }  // namespace
 
 void AddAssembleCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<AssembleFlags>();
   CLI::App* command = app.add_subcommand("assemble", "Builds a structure in simulation, insertion by insertion");
   command
       ->add_option("--assembly", flags->assembly,

@@ -18,7 +18,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct CellFlags {
   std::string robot;
   std::string block;
   std::string box;
@@ -31,7 +31,7 @@ struct Flags {
   bool json = false;
 };
 
-void Calibrate(const Flags& flags, Session& session) {
+void Calibrate(const CellFlags& flags, Session& session) {
   RequireOutputs({{"--out", flags.out, FileKind::kCell}}, {flags.token_file});
   const execution::WorkspaceBox corners = ParseBox("--block", flags.block);
   const execution::KnownBlock block{corners.min_m, corners.max_m};
@@ -83,7 +83,7 @@ void Calibrate(const Flags& flags, Session& session) {
 void AddCellCommand(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("cell", "What is known of a robot's cell");
   command->require_subcommand(1);
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<CellFlags>();
   CLI::App* calibrate = command->add_subcommand(
       "calibrate", "Touch a known block: sensor bias, tool centre point, stiffness, reaction time");
   calibrate->add_option("--robot", flags->robot, "HOST:PORT of the robot (docs/robot-protocol.md)")->required();

@@ -29,7 +29,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct DbFlags {
   std::string file;
   std::string extents;
   std::string task;
@@ -55,7 +55,7 @@ nlohmann::json ProblemJson(const policies::StoredProblem& problem, const std::ve
           {"wall_s", problem.wall_s}};
 }
 
-workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags& flags) {
+workflow::PlanningSetup SetupFor(const policies::Database& database, const DbFlags& flags) {
   const policies::DatabaseIdentity& identity = database.identity();
   ProgressBar bar("contact map");
   workflow::PlanningSetupOptions options = workflow::SetupOptionsOf(identity);
@@ -66,7 +66,7 @@ workflow::PlanningSetup SetupFor(const policies::Database& database, const Flags
   return setup;
 }
 
-policies::StoredProblem Find(policies::Database& database, const Flags& flags) {
+policies::StoredProblem Find(policies::Database& database, const DbFlags& flags) {
   auto stored = database.Get(planner::ParseExtents(flags.extents, database.identity().axes));
   if (!stored) {
     throw InputError(flags.file, "holds no problem " + flags.extents, "see feeler db list " + flags.file);
@@ -89,7 +89,7 @@ std::optional<std::pair<double, double>> ForceOf(const policies::DatabaseIdentit
   }
 }
 
-void Info(const Flags& flags) {
+void Info(const DbFlags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::DatabaseIdentity& identity = database.identity();
   if (flags.json) {
@@ -141,7 +141,7 @@ void Info(const Flags& flags) {
   Print("content             {}\n", database.ContentDigest());
 }
 
-void List(const Flags& flags) {
+void List(const DbFlags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const auto problems = database.List();
   if (flags.json) {
@@ -159,7 +159,7 @@ void List(const Flags& flags) {
   }
 }
 
-void Show(const Flags& flags) {
+void Show(const DbFlags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::StoredProblem stored = Find(database, flags);
   nlohmann::json json = ProblemJson(stored, database.identity().axes);
@@ -181,7 +181,7 @@ void Show(const Flags& flags) {
   }
 }
 
-void Verify(const Flags& flags, Session& session) {
+void Verify(const DbFlags& flags, Session& session) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
   ProgressBar bar("replaying");
@@ -207,7 +207,7 @@ void Verify(const Flags& flags, Session& session) {
   if (result.faults > 0 || cancelled) session.exit_code = 1;
 }
 
-void Export(const Flags& flags) {
+void Export(const DbFlags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const policies::StoredProblem stored = Find(database, flags);
   if (!stored.policy) throw NegativeResult(flags.file, flags.extents + " holds no complete policy");
@@ -247,7 +247,7 @@ void AddMerge(CLI::App& db, const Session& session) {
   command->callback([flags, &session] { Merge(*flags, session); });
 }
 
-void Bundle(const Flags& flags) {
+void Bundle(const DbFlags& flags) {
   const policies::Database database = policies::Database::OpenReadOnly(flags.file);
   const workflow::PlanningSetup setup = SetupFor(database, flags);
   database.RequireFingerprint(setup.task().name, setup.fingerprint);
@@ -266,13 +266,13 @@ void AddDbCommand(CLI::App& app, Session& session) {
   CLI::App* db = app.add_subcommand("db", "Look into a policy database");
   db->require_subcommand(1);
   const auto add = [db](const std::string& name, const std::string& help) {
-    auto flags = std::make_shared<Flags>();
+    auto flags = std::make_shared<DbFlags>();
     CLI::App* command = db->add_subcommand(name, help);
     command->add_option("file", flags->file, "database file")->required();
     command->add_flag("--json", flags->json, "print JSON");
     return std::pair(command, flags);
   };
-  const auto add_task = [](CLI::App* command, const std::shared_ptr<Flags>& flags) {
+  const auto add_task = [](CLI::App* command, const std::shared_ptr<DbFlags>& flags) {
     command->add_option("--task", flags->task, "task file (default: the task the database names)");
     AddJobs(*command, flags->jobs, "threads");
   };

@@ -24,7 +24,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct ForwardedFlags {
   std::string task;
   std::string db;
   TargetSources sources;
@@ -44,7 +44,7 @@ std::string ExecuteProgram() {
 }
 
 /// Databases of older versions have no bundle beside them: it is made where the task is given.
-void EnsureBundle(const Flags& flags) {
+void EnsureBundle(const ForwardedFlags& flags) {
   std::error_code error;
   if (flags.task.empty() || flags.db.empty()) return;
   if (std::filesystem::exists(policies::BundlePathOf(flags.db), error)) return;
@@ -55,7 +55,7 @@ void EnsureBundle(const Flags& flags) {
   workflow::KeepBundle(setup, flags.db);
 }
 
-void Execute(const Flags& flags, const std::vector<std::string>& others) {
+void Execute(const ForwardedFlags& flags, const std::vector<std::string>& others) {
   std::vector<std::string> arguments = {"feeler execute"};
   const auto give = [&](const char* name, const std::string& value) {
     if (!value.empty()) arguments.insert(arguments.end(), {name, value});
@@ -82,7 +82,7 @@ void Execute(const Flags& flags, const std::vector<std::string>& others) {
 }  // namespace
 
 void AddExecuteCommand(CLI::App& app, Session& /*session*/) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ForwardedFlags>();
   CLI::App* command = app.add_subcommand(
       "execute", "Carry a policy out on a robot, or its simulation, over a wire (docs/robot-protocol.md)");
   command->set_help_flag();  // feeler-execute has the options

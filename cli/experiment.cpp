@@ -20,7 +20,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct ExperimentFlags {
   std::string name;
   std::string out;
   bool list = false;
@@ -40,7 +40,7 @@ void List() {
   }
 }
 
-void Run(const CLI::App& command, const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const ExperimentFlags& flags, Session& session) {
   if (flags.list) return List();
   if (flags.name.empty()) {
     throw InputError("experiment", "no name given", "choose one of " + evaluation::ExperimentNames());
@@ -105,7 +105,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 }  // namespace
 
 void AddExperimentCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ExperimentFlags>();
   CLI::App* command =
       app.add_subcommand("experiment", "Measure a table or figure of the paper beside its printed values");
   command->add_option("name", flags->name, "which; see --list");

@@ -20,7 +20,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct ExportFlags {
   std::string problem;
   std::string rock_sample;
   std::uint64_t seed = 1;
@@ -31,7 +31,7 @@ struct Flags {
   NoiseFlags noise;
 };
 
-void Write(const Flags& flags, const std::string& text) {
+void Write(const ExportFlags& flags, const std::string& text) {
   if (flags.out.empty()) {
     PrintResult(text);
   } else {
@@ -40,7 +40,7 @@ void Write(const Flags& flags, const std::string& text) {
 }
 
 /// "7x8": a grid of 7 by 7 with 8 rocks, drawn from the seed.
-std::string RockSampleText(const Flags& flags) {
+std::string RockSampleText(const ExportFlags& flags) {
   int size = 0;
   int rocks = 0;
   char rest = 0;
@@ -51,7 +51,7 @@ std::string RockSampleText(const Flags& flags) {
   return flags.format == "pomdp" ? planner::FormatCassandraPomdp(pomdp) : planner::FormatPomdpx(pomdp);
 }
 
-std::string NoisyText(const CLI::App& command, const Flags& flags, const planner::NoisyProblem& noisy) {
+std::string NoisyText(const CLI::App& command, const ExportFlags& flags, const planner::NoisyProblem& noisy) {
   if (command.count("--upper-bound") > 0) {
     throw InputError("--upper-bound", "does not go with noise", "--wrong-cost says what a wrong declaration costs");
   }
@@ -66,7 +66,7 @@ std::string NoisyText(const CLI::App& command, const Flags& flags, const planner
   return flags.format == "pomdp" ? planner::FormatCassandraPomdp(pomdp) : planner::FormatPomdpx(pomdp);
 }
 
-void Run(const CLI::App& command, const Flags& flags) {
+void Run(const CLI::App& command, const ExportFlags& flags) {
   if (flags.format != "pomdp" && flags.format != "pomdpx") {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of pomdp, pomdpx");
   }
@@ -93,7 +93,7 @@ void Run(const CLI::App& command, const Flags& flags) {
 }  // namespace
 
 void AddExportCommand(CLI::App& app, Session& /*session*/) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ExportFlags>();
   CLI::App* command = app.add_subcommand("export", "Write a lattice problem for other POMDP solvers");
   command->add_option("--problem", flags->problem, "lattice problem file (docs/file-formats.md)");
   command->add_option("--rock-sample", flags->rock_sample,

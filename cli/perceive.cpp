@@ -31,7 +31,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct PerceiveFlags {
   std::string task;
   TargetSources sources;
   std::string db;
@@ -51,7 +51,7 @@ struct CalibrateFlags {
   bool json = false;
 };
 
-void Perceive(const Flags& flags) {
+void Perceive(const PerceiveFlags& flags) {
   RequireSources(flags.task, flags.sources);
   const env::TaskModel model = env::LoadTask(flags.task);
   const Task& task = model.task;
@@ -183,7 +183,7 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
 }  // namespace
 
 void AddPerceiveCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<PerceiveFlags>();
   CLI::App* command =
       app.add_subcommand("perceive", "Hypotheses from a depth image or point cloud; calibrate: the table this takes");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");

@@ -26,7 +26,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct PolicyFlags {
   std::string policy;
   std::string problem;
   std::string task;
@@ -41,7 +41,7 @@ struct Flags {
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
-planner::Problem TaskProblem(const Flags& flags, const std::string& task, workflow::PlanningSetupOptions options,
+planner::Problem TaskProblem(const PolicyFlags& flags, const std::string& task, workflow::PlanningSetupOptions options,
                              const policies::Database* database) {
   ProgressBar bar("contact map");
   options.jobs = Parallelism(flags.jobs);
@@ -54,7 +54,7 @@ planner::Problem TaskProblem(const Flags& flags, const std::string& task, workfl
 }
 
 /// A policy of the database at --extents.
-planner::ExpandedPolicy FromDatabase(const Flags& flags) {
+planner::ExpandedPolicy FromDatabase(const PolicyFlags& flags) {
   policies::Database database = policies::Database::OpenReadOnly(flags.db);
   const auto stored = database.Get(planner::ParseExtents(flags.extents, database.identity().axes));
   if (!stored) throw InputError(flags.db, "holds no problem " + flags.extents, "see feeler db list " + flags.db);
@@ -66,7 +66,7 @@ planner::ExpandedPolicy FromDatabase(const Flags& flags) {
 }
 
 /// A policy file, with the problem that it was made for.
-planner::ExpandedPolicy FromFile(const Flags& flags) {
+planner::ExpandedPolicy FromFile(const PolicyFlags& flags) {
   const policies::PolicyFile file = policies::ReadPolicyFile(flags.policy);
   planner::Problem problem;
   if (!flags.problem.empty()) {
@@ -82,7 +82,7 @@ planner::ExpandedPolicy FromFile(const Flags& flags) {
   return planner::ExpandPolicy(problem, policies::ToPolicy(file, problem, flags.policy));
 }
 
-void RequireOneSource(const Flags& flags) {
+void RequireOneSource(const PolicyFlags& flags) {
   const std::string help = "see feeler policy graph --help";
   if (flags.policy.empty() == flags.db.empty()) throw InputError("policy graph", "give either --policy or --db", help);
   if (!flags.db.empty() && !flags.problem.empty()) throw InputError("--problem", "goes with --policy, not --db", help);
@@ -98,7 +98,7 @@ void RequireOneSource(const Flags& flags) {
   }
 }
 
-void Graph(const Flags& flags) {
+void Graph(const PolicyFlags& flags) {
   if (flags.format != "dot" && flags.format != "html") {
     throw InputError("--format", "unknown value \"" + flags.format + "\"", "choose one of dot, html");
   }
@@ -126,7 +126,7 @@ void AddPolicyCommand(CLI::App& app, Session& session) {
   CLI::App* policy = app.add_subcommand("policy", "Look at one policy");
   policy->require_subcommand(1);
   AddPolicySimulateCommand(*policy, session);
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<PolicyFlags>();
   CLI::App* command = policy->add_subcommand("graph", "Draw a policy of a file or a database");
   command->add_option("--policy", flags->policy, "policy file (docs/file-formats.md)");
   command->add_option("--problem", flags->problem, "lattice problem file that the policy file was made for");

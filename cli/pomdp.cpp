@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cmath>
 #include <memory>
 
 #include "feeler/cli/common/console.h"
@@ -24,8 +23,6 @@ namespace feeler::cli {
 namespace {
 
 using planner::PomdpSolverKind;
-
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 PomdpSolverKind KindOf(const CLI::App& command, const SolverFlags& solver, const planner::Pomdp& pomdp) {
   if (command.count("--solver") == 0) return planner::PomdpSolverOptions::DefaultKind(pomdp);
@@ -200,8 +197,8 @@ void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const Solve
                                {"values", pomdp.values_are_costs ? "cost" : "reward"},
                                {"status", planner::ToString(result.status)},
                                {"solver", planner::ToString(options.kind)},
-                               {"value_lower", Number(result.value_lower)},
-                               {"value_upper", Number(result.value_upper)},
+                               {"value_lower", NumberOrNull(result.value_lower)},
+                               {"value_upper", NumberOrNull(result.value_upper)},
                                {"trials", result.trials},
                                {"expansions", result.expansions},
                                {"cpu_s", result.cpu_s},

@@ -27,7 +27,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct PreprocessFlags {
   std::string task;
   std::string out;
   std::string family;
@@ -83,7 +83,7 @@ std::int64_t MemoryOnOneHost(const workflow::FamilyEstimate& estimate, int ranks
 }
 
 void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily& family,
-              planner::PreprocessOptions options, const Flags& flags) {
+              planner::PreprocessOptions options, const PreprocessFlags& flags) {
   if (options.solver.solver == planner::SolverKind::kERtdpBel && options.experience != planner::ExperienceKind::kNone) {
     throw InputError("--estimate", "what e-rtdp-bel takes depends on the experience, which a sample does not have",
                      "give --experience none, or another --solver");
@@ -142,7 +142,7 @@ void Estimate(const workflow::PlanningSetup& setup, const planner::ProblemFamily
 }
 
 /// Problems of the file that no touch solves: they are not failures of the solver.
-void NoteUnlocalizable(const Flags& flags, const Task& task) {
+void NoteUnlocalizable(const PreprocessFlags& flags, const Task& task) {
   policies::Database database = policies::Database::OpenReadOnly(flags.out);
   std::int64_t count = 0;
   std::string example;
@@ -158,7 +158,7 @@ void NoteUnlocalizable(const Flags& flags, const Task& task) {
       count, example, flags.task);
 }
 
-void Run(const CLI::App& command, const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const PreprocessFlags& flags, Session& session) {
   if (flags.out.empty() && !flags.estimate) {
     throw InputError("--out", "missing", "give the database to write, or --estimate");
   }
@@ -237,7 +237,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 }  // namespace
 
 void AddPreprocessCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<PreprocessFlags>();
   CLI::App* command = app.add_subcommand("preprocess", "Build (or continue) the policy database of a task");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--out", flags->out, "database file; an existing one is continued");

@@ -12,13 +12,13 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct RecordsFlags {
   std::vector<std::string> files;
   std::string out;
   bool json = false;
 };
 
-void Merge(const Flags& flags) {
+void Merge(const RecordsFlags& flags) {
   RequireOutputs({{"--out", flags.out, FileKind::kRecords}}, flags.files);
   const evaluation::RunSummary summary = evaluation::Summarize(evaluation::MergeRecords(flags.files, flags.out));
   if (flags.json) {
@@ -34,7 +34,7 @@ void Merge(const Flags& flags) {
 void AddRecordsCommand(CLI::App& app, Session& /*session*/) {
   CLI::App* records = app.add_subcommand("records", "Put records of episodes together");
   records->require_subcommand(1);
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<RecordsFlags>();
   CLI::App* merge = records->add_subcommand("merge", "Put the records of all shards of a run together");
   merge->add_option("files", flags->files, "what feeler run --shard I/N --out wrote, every shard")->required();
   merge->add_option("--out", flags->out, "records to write; a file that exists is not overwritten")->required();

@@ -18,14 +18,14 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct ReportFlags {
   std::string folder;
   std::string out;
   double replay_megabytes = 12.0;
   bool json = false;
 };
 
-void Run(const Flags& flags, Session& session) {
+void Run(const ReportFlags& flags, Session& session) {
   (void)session;
   RequireOutputs({{"--out", flags.out, FileKind::kReport}}, {});  // what it reads is not of that kind
   const evaluation::Results results = evaluation::ReadResults(flags.folder);
@@ -57,7 +57,7 @@ void Run(const Flags& flags, Session& session) {
 }  // namespace
 
 void AddReportCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<ReportFlags>();
   CLI::App* command = app.add_subcommand("report", "One self-contained page: tables, figures, failures, replays");
   command->add_option("dir", flags->folder, "folder of results (feeler experiment --out) or records (feeler run --out)")
       ->required();

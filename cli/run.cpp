@@ -49,7 +49,7 @@ namespace {
 /// Memory for their rows, some 1 kB each, is what bounds them.
 constexpr std::int64_t kMostEpisodes = 10'000'000;
 
-struct Flags {
+struct RunFlags {
   std::string task;
   std::string db;
   std::string policy = "database";
@@ -82,13 +82,13 @@ std::string NoiseHelp() {
   return help;
 }
 
-std::vector<std::string> Inputs(const Flags& flags) {
+std::vector<std::string> Inputs(const RunFlags& flags) {
   std::vector<std::string> inputs = InputsOfTask(flags.task);
   inputs.insert(inputs.end(), {flags.db, flags.table, flags.prior});
   return inputs;
 }
 
-void RequireSane(const Flags& flags) {
+void RequireSane(const RunFlags& flags) {
   if (!flags.perception.empty() && flags.perception != "icp") {
     throw InputError("--perception", "unknown name \"" + flags.perception + "\"", "choose icp");
   }
@@ -109,7 +109,7 @@ void RequireSane(const Flags& flags) {
 }
 
 /// The problems that episodes draw from: the one given, else all that the database has a policy for, else the task's.
-planner::ProblemFamily FamilyFor(const Flags& flags, const Task& task, policies::Database* database) {
+planner::ProblemFamily FamilyFor(const RunFlags& flags, const Task& task, policies::Database* database) {
   if (!flags.extents.empty()) {
     planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
     workflow::RequireWithinTask(family, task);
@@ -137,7 +137,8 @@ std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::stri
 }
 
 /// Films --video-episode, with --versus a second time under that policy.
-void WriteVideo(const Flags& flags, const Session& session, const std::function<workflow::EpisodeRunner()>& make_runner,
+void WriteVideo(const RunFlags& flags, const Session& session,
+                const std::function<workflow::EpisodeRunner()>& make_runner,
                 const std::function<workflow::EpisodeRunner()>& make_versus) {
   ProgressBar bar("video frames");
   const auto episode = static_cast<std::uint64_t>(flags.video_episode);
@@ -160,7 +161,7 @@ nlohmann::json ContactJson(const workflow::ContactSpeeds& speeds) {
 }
 
 /// Everything that shapes the records, beside the number of episodes: what ranks and shards must have in common.
-nlohmann::json SettingsJson(const Flags& flags, const workflow::PlanningSetup& setup, policies::Database* database) {
+nlohmann::json SettingsJson(const RunFlags& flags, const workflow::PlanningSetup& setup, policies::Database* database) {
   nlohmann::json settings = {{"command", "run"},
                              {"version", FEELER_VERSION},
                              {"task", setup.task().name},
@@ -184,7 +185,7 @@ nlohmann::json SettingsJson(const Flags& flags, const workflow::PlanningSetup& s
   return settings;
 }
 
-void Run(const CLI::App& command, const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
   if (!session.serves()) RequireSane(flags);
   const Parallelism jobs = JobsOf(command, flags.jobs, session);
   const std::optional<workflow::Shard> shard = ShardOf(flags.shard);
@@ -335,7 +336,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 }  // namespace
 
 void AddRunCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<RunFlags>();
   CLI::App* command = app.add_subcommand("run", "Episodes in simulation: transfer, localize by touch, insert, score");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();
   command->add_option("--db", flags->db, "policy database of the task (feeler preprocess)");

@@ -25,7 +25,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct SimulatorFlags {
   std::string task;
   std::string listen;
   std::string db;
@@ -42,7 +42,7 @@ struct Flags {
   bool json = false;
 };
 
-planner::ProblemFamily FamilyOf(const Flags& flags, const Task& task, policies::Database* database) {
+planner::ProblemFamily FamilyOf(const SimulatorFlags& flags, const Task& task, policies::Database* database) {
   if (!flags.extents.empty()) {
     planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
     workflow::RequireWithinTask(family, task);
@@ -75,7 +75,7 @@ nlohmann::json Summary(const execution::RobotServer& server) {
           {"episodes_judged", server.episodes_judged()}};
 }
 
-void Simulate(const Flags& flags, Session& session) {
+void Simulate(const SimulatorFlags& flags, Session& session) {
   const execution::Address address = execution::ParseAddress("--listen", flags.listen);
   execution::ServerOptions options;
   options.token = execution::ReadTokenFile(flags.token_file);
@@ -140,7 +140,7 @@ void Simulate(const Flags& flags, Session& session) {
 }  // namespace
 
 void AddSimulateCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<SimulatorFlags>();
   CLI::App* command = app.add_subcommand(
       "simulate", "The simulated robot behind the wire protocol (docs/robot-protocol.md), for feeler execute");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file")->required();

@@ -30,7 +30,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct SolveFlags {
   std::string task;
   std::string extents;
   std::string problem;
@@ -47,7 +47,7 @@ struct Flags {
 };
 
 /// `noise`: of the problem's file, if it has any.
-planner::Problem LoadProblem(const Flags& flags, const Session& session, planner::Noise& noise) {
+planner::Problem LoadProblem(const SolveFlags& flags, const Session& session, planner::Noise& noise) {
   if (flags.task.empty() == flags.problem.empty()) {
     throw InputError("solve", "give either --task with --extents, or --problem, or --pomdp", "see feeler solve --help");
   }
@@ -90,8 +90,6 @@ std::string NameOf(const planner::Problem& problem, int hypothesis) {
 }
 
 /// JSON has no infinity: null.
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
-
 void PrintResult(const planner::SolverResult& result, const std::string& unit) {
   Print("status         {}\n", planner::ToString(result.status));
   if (result.complete()) {
@@ -139,7 +137,7 @@ void RequireNoHeuristic(const CLI::App& command) {
   }
 }
 
-void Run(const CLI::App& command, const Flags& flags, Session& session) {
+void Run(const CLI::App& command, const SolveFlags& flags, Session& session) {
   if (!flags.pomdp.pomdp.empty()) {
     return RunSolvePomdp(command, flags.pomdp, flags.solver, flags.out, flags.json, session);
   }
@@ -184,10 +182,10 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
                {"setting", flags.solver.setting},
                {"heuristic", planner::ToString(options.heuristic)},
                {"hypotheses", problem.hypotheses.size()},
-               {"expected_cost", Number(result.expected_cost)},
+               {"expected_cost", NumberOrNull(result.expected_cost)},
                {"cost_unit", unit},
-               {"lower_bound", Number(result.lower_bound)},
-               {"ratio", Number(result.Ratio())},
+               {"lower_bound", NumberOrNull(result.lower_bound)},
+               {"ratio", NumberOrNull(result.Ratio())},
                {"trials", result.trials},
                {"expansions", result.expansions},
                {"cpu_s", result.cpu_s},
@@ -205,7 +203,7 @@ void Run(const CLI::App& command, const Flags& flags, Session& session) {
 }  // namespace
 
 void AddSolveCommand(CLI::App& app, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<SolveFlags>();
   CLI::App* command = app.add_subcommand("solve", "Solve one problem; prints the bounds as they close");
   command->add_option("--task", flags->task, "name under models/tasks/, or path of a task file");
   command->add_option("--extents", flags->extents, "hypotheses per axis of the task, e.g. 7x7x5 (with --task)");

@@ -24,6 +24,8 @@ struct Session {
 
 /// Prints a result for machines: one JSON document on stdout.
 void PrintJson(const nlohmann::json& value);
+/// The number, or null where it is not finite.
+nlohmann::json NumberOrNull(double value);
 
 /// Updates the bar, and ends the work with Interrupted where a signal has come: for work that leaves nothing to keep
 /// when it is given up. The bar must outlive the callback.

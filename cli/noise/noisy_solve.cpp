@@ -1,7 +1,6 @@
 // feeler solve with noise: problems whose readings are wrong now and then.
 #include "feeler/cli/noise/noisy_solve.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "feeler/cli/common/console.h"
@@ -14,8 +13,6 @@
 
 namespace feeler::cli {
 namespace {
-
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
 
 nlohmann::json ResultJson(const planner::NoisyProblem& noisy, const planner::SolverOptions& options,
                           const planner::NoisyResult& result, const std::string& unit) {
@@ -33,7 +30,7 @@ nlohmann::json ResultJson(const planner::NoisyProblem& noisy, const planner::Sol
           {"expected_cost", policy.expected_cost},
           {"cost_unit", unit},
           {"lower_bound", result.lower_bound},
-          {"ratio", Number(result.Ratio())},
+          {"ratio", NumberOrNull(result.Ratio())},
           {"right", policy.right},
           {"wrong", policy.wrong},
           {"given_up", policy.given_up},

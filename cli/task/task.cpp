@@ -32,7 +32,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct TaskFlags {
   std::string task;
   std::string opening = "closed";
   int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
@@ -174,7 +174,7 @@ void PrintTask(const workflow::PlanningSetup& setup) {
   for (const env::AxisVisibility& axis : env::AxisVisibilities(task, map)) PrintVisibility(axis);
 }
 
-void Show(const Flags& flags) {
+void Show(const TaskFlags& flags) {
   ProgressBar bar("contact map");
   workflow::PlanningSetupOptions options;
   options.opening = ParseOpening(flags.opening);
@@ -189,7 +189,7 @@ void Show(const Flags& flags) {
   }
 }
 
-env::Image RenderView(const env::TaskModel& model, const Flags& flags) {
+env::Image RenderView(const env::TaskModel& model, const TaskFlags& flags) {
   if (flags.view == "overview") return env::RenderSceneImage(env::BuildScene(model), env::SceneView::kOverview);
   if (flags.view == "close-up") return env::RenderSceneImage(env::BuildScene(model), env::SceneView::kCloseUp);
   env::TaskViewOptions options;
@@ -200,7 +200,7 @@ env::Image RenderView(const env::TaskModel& model, const Flags& flags) {
   throw InputError("--view", "unknown view \"" + flags.view + "\"", "choose one of overview, close-up, section, mouth");
 }
 
-void Render(const Flags& flags) {
+void Render(const TaskFlags& flags) {
   RequireOutputs({{"--out", flags.out, FileKind::kPng}}, InputsOfTask(flags.task));
   env::WritePng(RenderView(env::LoadTask(flags.task), flags), flags.out);
 }
@@ -235,7 +235,7 @@ void List(bool json) {
 void AddTaskCommand(CLI::App& app, Session& session) {
   CLI::App* task = app.add_subcommand("task", "Tasks: what is inserted into what");
   task->require_subcommand(1);
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<TaskFlags>();
   CLI::App* list = task->add_subcommand("list", "Names of the tasks under models/tasks/");
   list->add_flag("--json", flags->json, "print JSON");
   list->callback([flags] { List(flags->json); });

@@ -20,7 +20,7 @@ namespace {
 
 using env::TaskFinding;
 
-struct Flags {
+struct TaskCheckFlags {
   std::string task;
   std::string opening = "closed";
   std::string table;
@@ -28,7 +28,7 @@ struct Flags {
   bool json = false;
 };
 
-void Check(const Flags& flags, Session& session) {
+void Check(const TaskCheckFlags& flags, Session& session) {
   ProgressBar bar("contact map");
   workflow::TaskCheckOptions options;
   options.opening = ParseOpening(flags.opening);
@@ -50,7 +50,7 @@ void Check(const Flags& flags, Session& session) {
 }  // namespace
 
 void AddTaskCheck(CLI::App& task, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<TaskCheckFlags>();
   CLI::App* command = task.add_subcommand(
       "check", "Everything that may be wrong with a task; exit code 0: nothing that prevents work, 1: that does");
   command->add_option("task", flags->task, "name, or path of a task file")->required();

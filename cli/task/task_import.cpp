@@ -29,7 +29,7 @@
 namespace feeler::cli {
 namespace {
 
-struct Flags {
+struct TaskImportFlags {
   std::string tool;
   std::string target;
   std::string out;
@@ -130,7 +130,7 @@ void SetUncertainty(const std::string& text, evaluation::ImportOptions& options)
   }
 }
 
-evaluation::ImportOptions OptionsFrom(const Flags& flags) {
+evaluation::ImportOptions OptionsFrom(const TaskImportFlags& flags) {
   evaluation::ImportOptions options;
   options.tool = flags.tool;
   options.target = flags.target;
@@ -187,7 +187,7 @@ env::TaskFindings Findings(const evaluation::ImportedTask& task, bool with_touch
   return findings;
 }
 
-void Import(const Flags& flags, Session& session) {
+void Import(const TaskImportFlags& flags, Session& session) {
   const evaluation::ImportOptions options = OptionsFrom(flags);
   const Parallelism jobs = Parallelism(flags.jobs);
   if (flags.episodes < 1) throw InputError("--episodes", "fewer than 1", "use --no-trial for none");
@@ -236,7 +236,7 @@ void Import(const Flags& flags, Session& session) {
 }  // namespace
 
 void AddTaskImport(CLI::App& task, Session& session) {
-  auto flags = std::make_shared<Flags>();
+  auto flags = std::make_shared<TaskImportFlags>();
   CLI::App* command = task.add_subcommand(
       "import",
       "From CAD to a task folder: task.xml with every number derived, import.json, report.html (docs/add-a-part.md)");

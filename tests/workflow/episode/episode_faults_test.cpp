@@ -15,6 +15,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/scene/oversize_target.h"
+#include "feeler/execution/recovery/fallback_ladder.h"
 #include "feeler/execution/recovery/online_planner.h"
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_draw.h"
@@ -232,6 +233,28 @@ TEST_P(NoisyEpisode, IsMasteredAndDeterministic) {
   }
   if (fault == "yaw-3") {
     EXPECT_LT(first.error->angle_rad, 0.0175);
+  }
+}
+
+// The tool slips into an opening that its belief knows closed: ways across begin so slowly that its walls are met
+// within the budget.
+TEST(NoisyEpisodes, FallingInMeetsTheWallsWithinTheBudget) {
+  EpisodeRunner runner = Runner(PlugSetup(), "fall-in");
+  for (std::uint64_t episode = 0; episode < 10; ++episode) {
+    const EpisodeRecord record = runner.Run(episode);
+    EXPECT_TRUE(record.execution.fell_in && record.inserted) << episode << ": " << record.reason;
+    EXPECT_LE(record.execution.peak_force_n, record.execution.force_budget_n) << episode;
+  }
+}
+
+// A turn is felt once, and then known: no sweep, no second fit, and ways are fast again.
+TEST(NoisyEpisodes, ATurnIsFeltAtOnce) {
+  EpisodeRunner runner = Runner(PlugSetup(), "yaw=3.5..5");
+  for (std::uint64_t episode = 0; episode < 6; ++episode) {
+    const EpisodeRecord record = runner.Run(episode);
+    EXPECT_TRUE(record.inserted) << episode << ": " << record.reason;
+    EXPECT_LE(record.execution.sim_time_s, 20.0) << episode;
+    for (const auto& rung : record.execution.ladder) EXPECT_NE(rung.rung, execution::rung::kYawSweep) << episode;
   }
 }
 
