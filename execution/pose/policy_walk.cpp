@@ -21,6 +21,9 @@ constexpr double kMisfitCap = 3.0;
 /// Tool and lattice may differ by this, cells.
 constexpr double kFarOff = 1.6;
 constexpr double kShortestFast = 0.75;
+/// A wall that was met within so many cells may reach to here, and is passed by so much before the tool goes fast.
+constexpr double kBeside = 6.0;
+constexpr double kPast = 1.0;
 
 }  // namespace
 
@@ -117,11 +120,29 @@ bool PolicyWalk::Flush(std::vector<FeltMotion>& felt) {
   Eigen::Vector3d target = from;
   target[axis] = Station()[axis];
   if (SignOf(pending_direction_) * (target[axis] - from[axis]) < 0.05) return true;
-  const MotionReport report = mover_.Fast(target, "transfer");
+  const MotionReport report = FastPast(target, pending_direction_);
   felt.push_back(FeltFrom(mover_.frame(), pending_direction_, from, report, kFastSigma_m));
   if (!report.contact) return true;
   mover_.Retreat(report.end - std::min(1.0, (report.end - from).norm()) * UnitVector(pending_direction_));
   return false;
+}
+
+MotionReport PolicyWalk::FastPast(const Eigen::Vector3d& target, Direction direction) {
+  const std::optional<Eigen::Vector3d>& met = met_[static_cast<std::size_t>(IndexOf(direction))];
+  const int axis = AxisOf(direction);
+  const int sign = SignOf(direction);
+  const Eigen::Vector3d begun = mover_.position();
+  if (met && sign * ((*met)[axis] - begun[axis]) > 0.0 && sign * (target[axis] - (*met)[axis]) > 0.0) {
+    Eigen::Vector3d beside = *met - begun;
+    beside[axis] = 0.0;
+    Eigen::Vector3d past = target;
+    past[axis] = sign * std::min(sign * target[axis], sign * (*met)[axis] + kPast);
+    if (beside.norm() <= kBeside) {
+      const MotionReport report = mover_.Fast(past, "transfer", {}, FreeBy::kEstimate);
+      if (report.contact || past == target) return report;
+    }
+  }
+  return mover_.Fast(target, "transfer");
 }
 
 PolicyWalk::Reading PolicyWalk::Feel(const GuardedMove& move, double nearest, double farthest,
@@ -138,7 +159,7 @@ PolicyWalk::Reading PolicyWalk::Feel(const GuardedMove& move, double nearest, do
   if (fast + behind >= kShortestFast) {
     Eigen::Vector3d target = begun;
     target[axis] = station + sign * fast;
-    const MotionReport report = mover_.Fast(target, "transfer");
+    const MotionReport report = FastPast(target, move.direction);
     // A contact at speed is read late: come off and feel again slowly.
     if (report.contact) mover_.Retreat(report.end - UnitVector(move.direction));
   }
@@ -147,6 +168,7 @@ PolicyWalk::Reading PolicyWalk::Feel(const GuardedMove& move, double nearest, do
   const MotionReport report =
       mover_.Probe(move.direction, end, "probe", std::array<double, 2>{nearest - gone, farthest - gone});
   felt.push_back(FeltFrom(mover_.frame(), move.direction, begun, report, kProbeSigma_m));
+  if (report.contact) met_[static_cast<std::size_t>(IndexOf(move.direction))] = report.end;
   return {sign * (report.end[axis] - station), report.contact};
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "feeler/execution/contact/execution_record.h"
@@ -60,6 +62,9 @@ class PolicyWalk {
   /// Tells the policy the outcome that explains the reading best. False: it knows none.
   bool TakeOver(const GuardedMove& move, const Reading& reading);
   bool Flush(std::vector<FeltMotion>& felt);
+  /// Fast along an axis; past a place beside which a wall was met in this direction no faster than the budget allows:
+  /// the edge may be farther off than the policy knows.
+  MotionReport FastPast(const Eigen::Vector3d& target, Direction direction);
   Eigen::Vector3d Station() const { return robot_.cast<double>() + problem_.map->phase(); }
 
   const planner::Problem& problem_;
@@ -70,6 +75,7 @@ class PolicyWalk {
   Cell robot_;
   bool pending_ = false;  ///< the tool still has to go to Station()
   Direction pending_direction_ = Direction::kPlusX;
+  std::array<std::optional<Eigen::Vector3d>, kDirectionCount> met_;  ///< where the tool last met a wall in a direction
 };
 
 }  // namespace feeler::execution
