@@ -16,6 +16,8 @@ namespace feeler::env {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
+/// The length of a unit vector is 1 but for this.
+constexpr double kUnit = 1e-6;
 
 }  // namespace
 
@@ -25,6 +27,9 @@ CameraView SimulatedRobot::Look() {
 }
 
 ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const {
+  if (!(std::abs(direction.norm() - 1.0) < kUnit)) {
+    throw InputError("robot", "a contact is asked for along no unit vector", "give a direction of length 1");
+  }
   const mjModel& model = world_.model();
   // MuJoCo pushes with the acceleration -b v - k r, taken on by the share `impedance` (its manual, "Solver
   // parameters"): of the parts, the stiffest geoms decide.

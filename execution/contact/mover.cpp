@@ -186,10 +186,13 @@ double Mover::SpeedOfProbe(const Eigen::Vector3d& direction, const ContactRespon
   const Eigen::Vector3d towards = frame_.world_T_estimate.linear() * *may_meet.edge_towards;
   speed_m_s = std::min(speed_m_s, SpeedOverEdge(face, robot_.Contact(towards), options_.force_budget_n));
   // The normal of an edge cut is between the faces; the tool comes along it with the cosine of its speed.
+  const Eigen::Vector3d beyond = towards - towards.dot(direction) * direction;
+  if (beyond.norm() < kAcross) return speed_m_s;  // along the way: that is the face
+  const Eigen::Vector3d across = beyond.normalized();
   constexpr int kNormals = 5;
   for (int i = 1; i <= kNormals; ++i) {
     const double angle = 0.5 * std::numbers::pi * i / (kNormals + 1);
-    const Eigen::Vector3d normal = std::cos(angle) * direction + std::sin(angle) * towards;
+    const Eigen::Vector3d normal = std::cos(angle) * direction + std::sin(angle) * across;
     const double along_m_s = SpeedWithinBudget(robot_.Contact(normal), options_.force_budget_n);
     speed_m_s = std::min(speed_m_s, along_m_s / std::cos(angle));
   }

@@ -183,8 +183,9 @@ void Localizer::Flush() {
     const Touch touch = MakeTouch(direction, from, report);
     evidence_.push_back(touch);
     if (!report.contact) break;
-    // Come off, but not farther back than the motion came.
-    mover_.Retreat(report.end - std::min(0.5, std::max(0.0, touch.travelled)) * UnitVector(direction));
+    // Come off, but not farther back than the motion came; half as far where the opposite wall may be as near.
+    const double came = std::max(0.0, touch.travelled);
+    mover_.Retreat(report.end - std::min(0.5, went_in_ ? 0.5 * came : came) * UnitVector(direction));
     if (FoundInside()) return;
     ShiftOffEdge(touch);
   }

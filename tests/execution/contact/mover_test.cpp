@@ -32,6 +32,7 @@ class HardRobot final : public Robot {
   void ZeroWrench() override {}
   double Time() const override { return time_s_; }
   ContactResponse Contact(const Eigen::Vector3d& direction) const override {
+    EXPECT_NEAR(direction.norm(), 1.0, 1e-9) << "a direction is a unit vector";
     ContactResponse contact = contact_;
     if (stiff_n_m) contact.stiffness_n_m = direction.cwiseAbs2().dot(*stiff_n_m);
     return contact;
@@ -149,6 +150,18 @@ TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
     EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
     mover.Fast({4.0, 3.0, 0.0}, "transfer");
     EXPECT_EQ(bench.robot.speeds_m_s.back() < bench.options.transfer_speed_m_s, !foreseen);
+  }
+}
+
+// The robot of the bench says so where one is none: after a surprise ways are judged at edges slanted to them.
+TEST(Mover, AsksForContactsAlongUnitVectors) {
+  Bench bench(1.0);
+  bench.robot.stiff_n_m = Eigen::Vector3d(2e4, 2e4, 9e4);
+  for (const Eigen::Vector3d& to : {Eigen::Vector3d(-5.0, 4.0, 6.6), Eigen::Vector3d(0.0, 3.0, -3.0)}) {
+    bench.record.startled = 1;
+    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    mover.Fast(mover.position() + to, "transfer");
+    EXPECT_LT(bench.robot.speeds_m_s.back(), bench.options.transfer_speed_m_s);
   }
 }
 
