@@ -16,9 +16,9 @@ struct CheckedPart {
 };
 
 /// Welds points, drops triangles without area, those that are there twice and points that the shape does not need
-/// (flat_points.h), turns shells that are seen from inside, and checks that the surface is closed: every edge is met from both sides, by one long edge or by several short ones.
-/// `where` names the part in messages. Throws InputError with the place for a surface that is open, has no thickness,
-/// cuts itself, or is of no consistent orientation.
+/// (flat_points.h), turns shells that are seen from inside, and checks that the surface is closed: every edge is met
+/// from both sides, by one long edge or by several short ones. `where` names the part in messages. Throws InputError
+/// with the place for a surface that is open, has no thickness, cuts itself, or is of no consistent orientation.
 CheckedPart CheckPart(const TriangleMesh& mesh, const std::string& where);
 
 }  // namespace feeler::cad
