@@ -50,8 +50,11 @@ void AddExecuteFlags(CLI::App& app, ExecuteFlags& flags) {
                  "(default: what the robot says it is, if Feeler has it)");
   app.add_option("--arm-base", flags.arm_base, "link of it whose frame the robot tells poses in (default: its root)");
   AddReal(app, "--speed", flags.speed, 0.01, 1.0, "all Cartesian speeds times this");
-  AddReal(app, "--force-budget", flags.force_budget_n, 1.0, 1000.0,
-          "no motion that feels may ask for a contact force above this, N (default: no limit)", false);
+  AddReal(
+      app, "--force-budget", flags.force_budget_n, 1.0, 1000.0,
+      "no contact harder than this, N: sets the speeds (default: the simulation's, else the task's, or more where the "
+      "sensor's noise asks for it)",
+      false);
   AddReal(app, "--confirm-limit", flags.confirm_limit_m, 1e-6, 1.0,
           "touch until the position across the insertion is known this well, m, default: 0.0005", false);
   app.add_flag("--no-ladder", flags.no_ladder, "the bare policy with its executor, without fallbacks");

@@ -74,6 +74,7 @@ int Run(const std::string& path, const char* extents_text) {
                       execution::LatticeStartPose(task, problem, estimate));
     execution::ExecutorOptions options;
     options.ladder = true;
+    options.force_budget_n = task.force_budget_n;
     options.travel_model = policies::TravelModelOf(bundle);
     const execution::ExecutionRecord record = execution::Execute(task, problem, estimate, policy, robot, options);
     // Only one who knows the truth can say whether the tool is in.
