@@ -1,6 +1,8 @@
 #include "feeler/cad/mesh/flat_points.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <set>
 #include <vector>
@@ -12,6 +14,9 @@ namespace {
 constexpr double kPlane_m = 1e-8;
 /// A triangle that is left is not flatter than this, m.
 constexpr double kSliver_m = 1e-7;
+
+/// Nearer than any two points of a welded part.
+constexpr double kSame_m = 1e-10;
 
 using Triangle = std::array<int, 3>;
 
@@ -28,28 +33,13 @@ class Pruner {
       any = false;
       for (int point = 0; point < static_cast<int>(mesh_.points.size()); ++point) any = Remove(point) || any;
     }
-    TriangleMesh pruned;
-    std::vector<int> number(mesh_.points.size(), -1);
-    for (int t = 0; t < mesh_.size(); ++t) {
-      if (Gone(t)) continue;
-      Triangle corners = Of(t);
-      for (int& corner : corners) {
-        int& known = number[At(corner)];
-        if (known < 0) {
-          known = static_cast<int>(pruned.points.size());
-          pruned.points.push_back(mesh_.points[At(corner)]);
-        }
-        corner = known;
-      }
-      pruned.triangles.push_back(corners);
-    }
-    return pruned;
+    std::erase_if(mesh_.triangles, [](const Triangle& corners) { return corners[0] < 0; });
+    return Welded(mesh_, kSame_m);  // the points that are left
   }
 
  private:
   static std::size_t At(int i) { return static_cast<std::size_t>(i); }
   Triangle& Of(int t) { return mesh_.triangles[At(t)]; }
-  bool Gone(int t) { return Of(t)[0] < 0; }
   bool Has(int t, int point) { return std::ranges::find(Of(t), point) != Of(t).end(); }
 
   /// The points that share an edge with a point, increasing; empty unless its triangles go once around it.

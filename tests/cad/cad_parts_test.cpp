@@ -130,7 +130,7 @@ TEST(FlatPoints, OfASubdividedPartTheCornersStay) {
 }
 
 TEST(FlatPoints, SeveralShortEdgesBesideALongOneStay) {
-  // The corner of a bump on one side of an edge, which the other side does not have, and points that a shape needs.
+  // One side of an edge is split in two, the other is not.
   TriangleMesh mesh = BoxMesh({0, 0, 0}, {0.01, 0.01, 0.01});
   const std::array<int, 3> split = mesh.triangles.front();
   const int middle = static_cast<int>(mesh.points.size());
