@@ -16,12 +16,12 @@
 #include "feeler/core/file_output.h"
 #include "feeler/core/parallelism.h"
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/family/problem_family.h"
 #include "feeler/planner/policy/expand_policy.h"
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/policies/io/policy_drawing.h"
 #include "feeler/policies/io/policy_json.h"
 #include "feeler/policies/storage/database.h"
-#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -49,7 +49,7 @@ planner::Problem TaskProblem(const PolicyFlags& flags, const std::string& task, 
   const workflow::PlanningSetup setup = workflow::LoadPlanningSetup(task, options);
   if (database != nullptr) database->RequireFingerprint(setup.task().name, setup.fingerprint);
   const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
-  workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
+  planner::RequireWithinTask({{extents}, flags.extents}, setup.task());
   return setup.ProblemOf(extents);
 }
 

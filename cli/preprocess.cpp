@@ -192,7 +192,7 @@ void Run(const CLI::App& command, const PreprocessFlags& flags, Session& session
   map_bar.Finish();
   if (!flags.prior.empty()) workflow::UsePrior(flags.prior, setup);
   const planner::ProblemFamily family = FamilyFor(flags.family, setup);
-  workflow::RequireWithinTask(family, setup.task());
+  planner::RequireWithinTask(family, setup.task());
 
   ProgressBar table_bar("tables");
   options.solver.on_tables = Interruptible(table_bar, session);

@@ -32,6 +32,7 @@
 #include "feeler/evaluation/records/merge_records.h"
 #include "feeler/evaluation/records/run_summary.h"
 #include "feeler/evaluation/records/scene_geometry.h"
+#include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/storage/hash.h"
 #include "feeler/version.h"
 #include "feeler/workflow/episode/episode.h"
@@ -41,7 +42,6 @@
 #include "feeler/workflow/scale/ordered_pieces.h"
 #include "feeler/workflow/scale/shard.h"
 #include "feeler/workflow/setup/contact_speeds.h"
-#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -112,7 +112,7 @@ void RequireSane(const RunFlags& flags) {
 planner::ProblemFamily FamilyFor(const RunFlags& flags, const Task& task, policies::Database* database) {
   if (!flags.extents.empty()) {
     planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
-    workflow::RequireWithinTask(family, task);
+    planner::RequireWithinTask(family, task);
     return family;
   }
   if (database == nullptr) return planner::FamilyOf(task);

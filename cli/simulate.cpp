@@ -20,7 +20,6 @@
 #include "feeler/workflow/episode/episode.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/served_episodes.h"
-#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -45,7 +44,7 @@ struct SimulatorFlags {
 planner::ProblemFamily FamilyOf(const SimulatorFlags& flags, const Task& task, policies::Database* database) {
   if (!flags.extents.empty()) {
     planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
-    workflow::RequireWithinTask(family, task);
+    planner::RequireWithinTask(family, task);
     return family;
   }
   if (database == nullptr) return planner::FamilyOf(task);
@@ -119,7 +118,7 @@ void Simulate(const SimulatorFlags& flags, Session& session) {
   }
   workflow::ServedEpisodes world(
       workflow::EpisodeRunner(setup, workflow::BuildEpisodeScene(*setup), policy_factory, episodes), flags.episodes,
-      std::move(replay_json));
+      flags.extents.empty() && flags.db.empty(), std::move(replay_json));
   execution::RobotServer server(world.Robot(), options);
   Note("feeler: the simulated robot listens on {}:{}, {}\n", address.host, listener.port(),
        flags.lockstep ? "in lockstep" : "in real time");
@@ -147,7 +146,8 @@ void AddSimulateCommand(CLI::App& app, Session& session) {
   command->add_option("--listen", flags->listen, "HOST:PORT, e.g. 127.0.0.1:7800 (port 0: any free one)")->required();
   AddInteger(*command, "--episodes", flags->episodes, 1, 10'000'000, "how many are offered; it ends after the last");
   AddSeed(*command, flags->seed, "of all draws: episodes are those of feeler run");
-  command->add_option("--extents", flags->extents, "always this problem, e.g. 7x7x7 (default: drawn)");
+  command->add_option("--extents", flags->extents,
+                      "always this problem, e.g. 7x7x7 (default: what the executor asks for, else drawn)");
   command->add_option("--db", flags->db, "draw the problems from this database; noise fall-in asks for it");
   command->add_option("--noise", flags->noise, "as of feeler run")->capture_default_str();
   command->add_option("--placement", flags->placement, "nominal or workspace, as of feeler run")->capture_default_str();

@@ -25,7 +25,6 @@
 #include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/workflow/perception/perceive_table.h"
-#include "feeler/workflow/setup/database_builder.h"
 
 namespace feeler::cli {
 namespace {
@@ -78,7 +77,7 @@ planner::Problem LoadProblem(const SolveFlags& flags, const Session& session, pl
   workflow::PlanningSetup setup = workflow::LoadPlanningSetup(flags.task, options);
   if (!flags.prior.empty()) workflow::UsePrior(flags.prior, setup);
   const planner::Extents extents = planner::ParseExtents(flags.extents, setup.task());
-  workflow::RequireWithinTask({{extents}, flags.extents}, setup.task());
+  planner::RequireWithinTask({{extents}, flags.extents}, setup.task());
   return setup.ProblemOf(extents);
 }
 

@@ -16,6 +16,7 @@
 #include "feeler/execution/records/scored_reason.h"
 #include "feeler/execution/remote/dry_robot.h"
 #include "feeler/execution/remote/token_file.h"
+#include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/database_policy.h"
 
 namespace feeler::cli {
@@ -31,18 +32,6 @@ constexpr double kRedial_s = 10.0;
 
 execution::CellFile CellOf(const ExecuteFlags& flags) {
   return flags.cell.empty() ? execution::CellFile{} : execution::ReadCellFile(flags.cell);
-}
-
-planner::Extents ExtentsOf(const std::vector<int>& numbers) {
-  planner::Extents extents;
-  extents.nx = numbers.at(0);
-  extents.ny = numbers.at(1);
-  extents.nz = numbers.at(2);
-  if (numbers.size() == 5) {
-    extents.n_yaw = numbers[3];
-    extents.n_pitch = numbers[4];
-  }
-  return extents;
 }
 
 }  // namespace
@@ -181,22 +170,23 @@ void Executing::Start() {
 std::optional<EpisodeReply> Executing::Told() {
   const planner::Extents asked =
       flags_.extents.empty() ? planner::Extents{} : planner::ParseExtents(flags_.extents, bundle_.task);
+  planner::RequireWithinTask({{asked}, flags_.extents}, bundle_.task);
   if (!welcome().simulated) {
     EpisodeReply told;
     told.task = bundle_.task.name;
     told.noise = "real";
     told.placement = "estimate";
-    told.extents = {asked.nx, asked.ny, asked.nz};
-    if (asked.n_yaw > 1 || asked.n_pitch > 1) told.extents.insert(told.extents.end(), {asked.n_yaw, asked.n_pitch});
+    told.extents = planner::ToCounts(asked);
     told.world_T_estimate = ParseEstimate(flags_.estimate);
     told.contact_threshold_n = cell_.contact_force_n.value_or(welcome().capabilities.contact_force_n);
     told.episode = static_cast<std::uint64_t>(done_);
     return told;
   }
+  const std::vector<int> wished = flags_.extents.empty() ? std::vector<int>{} : planner::ToCounts(asked);
   EpisodeReply told;
   for (;;) {
     try {
-      told = robot_->BeginEpisode(static_cast<std::uint64_t>(done_));
+      told = robot_->BeginEpisode(static_cast<std::uint64_t>(done_), wished);
       break;
     } catch (const WorldError&) {
       if (robot_->lost().empty() && done_ > 0) return std::nullopt;  // all that are offered are done
@@ -208,11 +198,11 @@ std::optional<EpisodeReply> Executing::Told() {
                      "simulates the task '" + told.task + "', the database is of '" + bundle_.task.name + "'",
                      "give the database of that task");
   }
-  if (!flags_.extents.empty() && !(ExtentsOf(told.extents) == asked)) {
-    throw InputError(
-        "--extents",
-        "are " + flags_.extents + ", and the simulation draws from " + planner::ToString(ExtentsOf(told.extents)),
-        "start feeler simulate with the same --extents");
+  if (!flags_.extents.empty() && !(planner::FromCounts(told.extents) == asked)) {
+    throw InputError("--extents",
+                     "are " + flags_.extents + ", and the simulation draws from " +
+                         planner::ToString(planner::FromCounts(told.extents)),
+                     "start feeler simulate with the same --extents, or with none");
   }
   return told;
 }
@@ -317,7 +307,7 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   const std::optional<EpisodeReply> told = Told();
   if (!told) return std::nullopt;
   ++done_;
-  const planner::Extents extents = ExtentsOf(told->extents);
+  const planner::Extents extents = planner::FromCounts(told->extents);
   ExecutedEpisode episode;
   execution::EpisodeLine& line = episode.line;
   line.task = bundle_.task.name;

@@ -234,7 +234,7 @@ bool EpisodeSweep::RunGroup(const std::string& task, const std::string& cost, st
   world.setup = std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(task, setup_options));
 
   const planner::ProblemFamily needed = ProblemsMet(task, cost, world.setup->task());
-  workflow::RequireWithinTask(needed, world.setup->task());
+  planner::RequireWithinTask(needed, world.setup->task());
   planner::PreprocessOptions build;
   build.solver = planner::FastSetting(planner::SolverKind::kCertified, 1.0);
   build.solver.gap = kGap;

@@ -9,6 +9,7 @@
 #include "feeler/core/json_depth.h"
 #include "feeler/evaluation/records/replay_json.h"
 #include "feeler/execution/records/episode_line.h"
+#include "feeler/planner/family/problem_family.h"
 
 namespace feeler::evaluation {
 nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
@@ -27,11 +28,7 @@ nlohmann::ordered_json ToJson(const workflow::EpisodeRecord& record) {
     line.perception = {seen->distance_m, seen->fitness, seen->rms_m, seen->points};
     line.perception_cpu_s = seen->cpu_s;
   }
-  line.extents = {record.extents.nx, record.extents.ny, record.extents.nz};
-  if (record.extents.n_yaw > 1 || record.extents.n_pitch > 1) {
-    line.extents.push_back(record.extents.n_yaw);
-    line.extents.push_back(record.extents.n_pitch);
-  }
+  line.extents = planner::ToCounts(record.extents);
   line.world_T_true = record.world_T_true;
   line.world_T_estimate0 = record.world_T_estimate0;
   line.error = record.error;

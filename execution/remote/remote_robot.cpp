@@ -273,8 +273,8 @@ void RemoteRobot::Bye() {
   SendFrame(ByeRequest{}, seq);
 }
 
-EpisodeReply RemoteRobot::BeginEpisode(std::optional<std::uint64_t> episode) {
-  const Reply reply = Exchange(EpisodeRequest{episode});
+EpisodeReply RemoteRobot::BeginEpisode(std::optional<std::uint64_t> episode, const std::vector<int>& extents) {
+  const Reply reply = Exchange(EpisodeRequest{episode, extents});
   const auto* told = std::get_if<EpisodeReply>(&reply);
   if (told == nullptr) throw WorldError("robot", "answers an episode with something else", "see its program");
   return *told;

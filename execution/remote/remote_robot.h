@@ -58,8 +58,9 @@ class RemoteRobot final : public Robot {
   void Start();
   /// After a protective stop, when somebody has looked.
   void Recover();
-  /// Simulations: the next episode, or that one. Throws WorldError where there is none.
-  EpisodeReply BeginEpisode(std::optional<std::uint64_t> episode);
+  /// Simulations: the next episode, or that one, of these extents if the simulation is free to choose (empty: as it
+  /// draws). Throws WorldError where there is none.
+  EpisodeReply BeginEpisode(std::optional<std::uint64_t> episode, const std::vector<int>& extents = {});
   VerdictReply Verdict();
   /// Says goodbye; the robot is at rest.
   void Bye();

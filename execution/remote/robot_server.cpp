@@ -244,7 +244,7 @@ std::optional<SessionEnd> RobotServer::Handle(const Framed<Request>& framed) {
       return std::nullopt;
     } else if (const auto* episode = std::get_if<EpisodeRequest>(&request)) {
       if (!served_.begin_episode) return Fail(framed.seq, "refused", "this robot is no simulation");
-      EpisodeReply reply = served_.begin_episode(episode->episode);
+      EpisodeReply reply = served_.begin_episode(*episode);
       if (mode_ == RobotMode::kProtectiveStop) mode_ = RobotMode::kReady;
       planned_ = PlanFaults(options_.faults, options_.seed, reply.episode);
       episode_motions_ = 0;

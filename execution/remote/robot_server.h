@@ -26,8 +26,9 @@ struct ServedRobot {
   /// Takes a question that the robot asks at least every 2 ms on its clock while it moves: a text brings it to rest,
   /// and the motion ends with kAborted and that text. Without it a motion cannot be stopped from here.
   std::function<void(std::function<std::string()>)> ask_while_moving;
-  /// Simulations: places everything for an episode (the one given, or the next) and says what an executor is told.
-  std::function<EpisodeReply(std::optional<std::uint64_t>)> begin_episode;
+  /// Simulations: places everything for an episode (the one given, or the next) and says what an executor is told. The
+  /// extents that are asked for are a wish: those of the reply hold.
+  std::function<EpisodeReply(const EpisodeRequest&)> begin_episode;
   /// Simulations: the truth about the episode as the world stands.
   std::function<VerdictReply()> judge;
   /// Simulations: transfers at this much of their speed, from now on (an ordered safety field).

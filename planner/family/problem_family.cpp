@@ -158,6 +158,21 @@ Extents ParseExtents(std::string_view text, const std::vector<AxisKind>& known) 
 
 Extents ParseExtents(std::string_view text, const Task& task) { return ParseExtents(text, AxesOf(task)); }
 
+std::vector<int> ToCounts(const Extents& extents) {
+  std::vector<int> counts = {extents.nx, extents.ny, extents.nz};
+  if (extents.n_yaw > 1 || extents.n_pitch > 1) counts.insert(counts.end(), {extents.n_yaw, extents.n_pitch});
+  return counts;
+}
+
+Extents FromCounts(const std::vector<int>& counts) {
+  Extents extents{counts.at(0), counts.at(1), counts.at(2)};
+  if (counts.size() == 5) {
+    extents.n_yaw = counts[3];
+    extents.n_pitch = counts[4];
+  }
+  return extents;
+}
+
 Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> map, const Extents& extents) {
   Problem problem;
   problem.name = fmt::format("{} {}", task.name, ToString(extents, task));
@@ -233,6 +248,21 @@ Extents LargestExtents(const ProblemFamily& family) {
     largest.n_pitch = std::max(largest.n_pitch, extents.n_pitch);
   }
   return largest;
+}
+
+void RequireWithinTask(const ProblemFamily& family, const Task& task) {
+  std::array<int, kAxisKinds> largest = {1, 1, 1, 1, 1};
+  for (const UncertainAxis& axis : task.axes) largest[static_cast<std::size_t>(axis.kind)] = axis.max_cells;
+  for (const Extents& extents : family.problems) {
+    for (int axis = 0; axis < kAxisKinds; ++axis) {
+      const int most = largest[static_cast<std::size_t>(axis)];
+      if (extents[axis] >= 1 && extents[axis] <= most) continue;
+      throw InputError("problem " + ToString(extents, task),
+                       fmt::format("task {} allows 1..{} {} along {}", task.name, most, axis < 3 ? "cells" : "angles",
+                                   ToString(static_cast<AxisKind>(axis))),
+                       "change the family, or the ranges in the task file");
+    }
+  }
 }
 
 ProblemFamily FamilyOf(const Task& task) {

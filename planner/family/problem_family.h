@@ -44,6 +44,11 @@ Extents ParseExtents(std::string_view text);
 Extents ParseExtents(std::string_view text, const std::vector<AxisKind>& axes);
 Extents ParseExtents(std::string_view text, const Task& task);
 
+/// As files and messages hold them: three counts (x, y, z), five (and yaw, pitch) where an angle has more than one.
+std::vector<int> ToCounts(const Extents& extents);
+/// The way back. Throws std::out_of_range for fewer than three counts.
+Extents FromCounts(const std::vector<int>& counts);
+
 /// The problem of a cuboid of hypotheses: offsets {0..n-1} per axis, lexicographic (x slowest, then y, z, yaw, pitch),
 /// the estimate at the cuboid's centre. The angles are the central ones of the task's lattice of orientations
 /// (core/orientation_lattice.h), which are the layers of the map. Start cell per axis: floor((n-1)/2 +
@@ -67,6 +72,9 @@ ProblemFamily UnionOf(const std::vector<ProblemFamily>& families, std::string sp
 Extents LargestExtents(const ProblemFamily& family);
 /// The family the task file gives by the ranges of its axes (an axis that is not uncertain has extent 1).
 ProblemFamily FamilyOf(const Task& task);
+
+/// Throws InputError unless every problem of the family lies within the axes of the task and their largest extents.
+void RequireWithinTask(const ProblemFamily& family, const Task& task);
 
 enum class ProblemOrder {
   kUncertainty,  ///< increasing number of hypotheses (Algorithm 3, line 3); ties lexicographic

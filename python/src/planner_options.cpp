@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "feeler/planner/family/problem_family.h"
-#include "feeler/workflow/setup/database_builder.h"
 #include "planner.h"
 
 namespace feeler::python {
@@ -17,7 +16,7 @@ planner::Extents ToExtents(const nb::object& extents, const Task& task) {
     text = fmt::format("{}", fmt::join(counts, "x"));
   }
   const planner::Extents result = planner::ParseExtents(text, task);
-  workflow::RequireWithinTask({{result}, text}, task);
+  planner::RequireWithinTask({{result}, text}, task);
   return result;
 }
 
@@ -38,7 +37,7 @@ planner::ProblemFamily ToFamily(const nb::object& family, const Task& task) {
     for (const auto& one : all) spec += (spec.empty() ? "" : ",") + one.spec;
     result = planner::UnionOf(all, spec);
   }
-  workflow::RequireWithinTask(result, task);
+  planner::RequireWithinTask(result, task);
   return result;
 }
 

@@ -51,10 +51,12 @@ int FreePort() {
 /// feeler simulate in the background, in lockstep, until it ends by itself or the object goes.
 class Simulation {
  public:
-  explicit Simulation(const std::vector<std::string>& more)
+  /// `extents`: what it was started with; empty: nothing.
+  explicit Simulation(const std::vector<std::string>& more, const std::string& extents = "4x4x4")
       : address_("127.0.0.1:" + std::to_string(FreePort())), folder_(ScratchFolder("simulation")) {
-    std::vector<std::string> arguments = {FEELER_BINARY, "simulate", "--task",     "plug",      "--listen",
-                                          address_,      "--json",   "--lockstep", "--extents", "4x4x4"};
+    std::vector<std::string> arguments = {FEELER_BINARY, "simulate", "--task", "plug",
+                                          "--listen",    address_,   "--json", "--lockstep"};
+    if (!extents.empty()) arguments.insert(arguments.end(), {"--extents", extents});
     arguments.insert(arguments.end(), more.begin(), more.end());
     child_ = fork();
     if (child_ == 0) {
@@ -129,6 +131,27 @@ TEST(WireCli, RecordsInLockstepAreThoseOfOneProcess) {
     EXPECT_EQ(summary.at("episodes"), 3);
     EXPECT_EQ(summary.at("links_lost"), 0);
   }
+}
+
+TEST(WireCli, TheExtentsOfTheExecutorHoldWhereTheSimulationHasNone) {
+  const std::string folder = ScratchFolder("wire_extents");
+  const std::vector<std::string> episodes = {"--seed", "3", "--episodes", "2"};
+  std::vector<std::string> run = {
+      "run", "--task", "plug", "--db", CubeDatabase(), "--extents", "4x4x4", "--out", folder + "/run.jsonl"};
+  run.insert(run.end(), episodes.begin(), episodes.end());
+  EXPECT_EQ(RunFeeler(run).exit_code, 0);
+  Simulation simulation(episodes, "");
+  const CommandResult executed =
+      RunFeeler(Execute(simulation.address(), {"--extents", "4x4x4", "--out", folder + "/wire.jsonl"}));
+  EXPECT_EQ(executed.exit_code, 0) << executed.err;
+  EXPECT_EQ(simulation.Wait().at("episodes_judged"), 2);
+  EXPECT_EQ(Untimed(folder + "/wire.jsonl"), Untimed(folder + "/run.jsonl"));
+  // More than the task allows is refused before anything is placed.
+  Simulation other(episodes, "");
+  const CommandResult refused = RunFeeler(Execute(other.address(), {"--extents", "4x4x44"}));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_NE(refused.err.find("4x4x44"), std::string::npos) << refused.err;
+  EXPECT_EQ(other.Stop().at("motions"), 0);
 }
 
 TEST(WireCli, ADryRunPrintsMotionsAndMovesNothing) {

@@ -88,9 +88,9 @@ EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::sh
   online_planner_ = std::make_shared<execution::OnlinePlanner>();
 }
 
-EpisodeDraw EpisodeRunner::Draw(std::uint64_t episode) {
+EpisodeDraw EpisodeRunner::Draw(std::uint64_t episode, const planner::ProblemFamily& family) {
   if (camera_cell_) {
-    return DrawPerceived(setup_->task(), *options_.perception, options_.family, options_.seed, episode, *camera_cell_);
+    return DrawPerceived(setup_->task(), *options_.perception, family, options_.seed, episode, *camera_cell_);
   }
   Task task = setup_->task();
   PlacementDraw placement{task.world_T_target, 0};
@@ -99,7 +99,7 @@ EpisodeDraw EpisodeRunner::Draw(std::uint64_t episode) {
     placement = placements_->Draw(random);
   }
   task.world_T_target = placement.world_T_target;
-  EpisodeDraw draw = DrawEpisode(task, options_.family, options_.seed, episode, noise_);
+  EpisodeDraw draw = DrawEpisode(task, family, options_.seed, episode, noise_);
   draw.rejected_placements = placement.rejected;
   return draw;
 }
@@ -147,8 +147,8 @@ void EpisodeRunner::Place(std::uint64_t episode, const EpisodeDraw& draw, Episod
   environment_->Reset(options_.seed, reset);
 }
 
-EpisodeRecord EpisodeRunner::Begin(std::uint64_t episode) {
-  EpisodeDraw draw = Draw(episode);
+EpisodeRecord EpisodeRunner::Begin(std::uint64_t episode, const std::optional<planner::Extents>& extents) {
+  EpisodeDraw draw = Draw(episode, extents ? planner::ProblemFamily{{*extents}, ""} : options_.family);
   EpisodeRecord record = Describe(episode, draw);
   if (!draw.failure.empty()) return record;
   if (noise_.fall_in) {
@@ -193,7 +193,7 @@ void EpisodeRunner::Score(EpisodeRecord& record) {
 EpisodeRecord EpisodeRunner::Run(std::uint64_t episode) {
   const Task& task = setup_->task();
   const double cpu_start_s = ThreadCpuSeconds();
-  EpisodeDraw draw = Draw(episode);
+  EpisodeDraw draw = Draw(episode, options_.family);
   EpisodeRecord record = Describe(episode, draw);
   if (!draw.failure.empty()) {
     record.timing.cpu_s = ThreadCpuSeconds() - cpu_start_s;

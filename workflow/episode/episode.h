@@ -64,19 +64,21 @@ class EpisodeRunner {
 
   // The same in steps, for a robot that somebody else moves.
   /// Draws the episode and places everything. `reason` of the record is empty, or why there is no episode. Null as
-  /// policy factory will do, unless a fault asks where the policy probes.
-  EpisodeRecord Begin(std::uint64_t episode);
+  /// policy factory will do, unless a fault asks where the policy probes. `extents`: of this problem, not one drawn
+  /// from the family; all else is drawn as ever.
+  EpisodeRecord Begin(std::uint64_t episode, const std::optional<planner::Extents>& extents = std::nullopt);
   /// Adds what is true of the world as it stands, and says so in `reason`: the score of what `execution` believes.
   void Score(EpisodeRecord& record);
 
   const EpisodeOptions& options() const { return options_; }
+  const Task& task() const { return setup_->task(); }
   const EpisodeFaults& faults() const { return noise_; }
   double force_budget_n() const { return force_budget_n_; }
   /// The world of the runner, e.g. to watch it.
   env::InsertionEnv& environment() { return *environment_; }
 
  private:
-  EpisodeDraw Draw(std::uint64_t episode);
+  EpisodeDraw Draw(std::uint64_t episode, const planner::ProblemFamily& family);
   EpisodeRecord Describe(std::uint64_t episode, const EpisodeDraw& draw) const;
   void DrawTruthThatFallsIn(std::uint64_t episode, const planner::Problem& problem, policies::Policy& policy,
                             EpisodeDraw& draw) const;

@@ -6,6 +6,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/gym/insertion_env.h"
+#include "feeler/planner/family/problem_family.h"
 
 namespace feeler::workflow {
 namespace {
@@ -32,9 +33,12 @@ execution::Capabilities CapabilitiesOf(const env::SimulatedRobot& robot, const E
 
 }  // namespace
 
-ServedEpisodes::ServedEpisodes(EpisodeRunner runner, std::int64_t episodes,
+ServedEpisodes::ServedEpisodes(EpisodeRunner runner, std::int64_t episodes, bool any_extents,
                                std::function<nlohmann::json(const Replay&)> replay_json)
-    : runner_(std::move(runner)), episodes_(episodes), replay_json_(std::move(replay_json)) {}
+    : runner_(std::move(runner)),
+      episodes_(episodes),
+      any_extents_(any_extents),
+      replay_json_(std::move(replay_json)) {}
 
 execution::ServedRobot ServedEpisodes::Robot() {
   env::SimulatedRobot& robot = runner_.environment().robot();
@@ -43,7 +47,7 @@ execution::ServedRobot ServedEpisodes::Robot() {
     robot.SetInterruption(std::move(question));
   };
   served.slow_transfers = [&robot](double factor) { robot.SlowTransfers(factor); };
-  served.begin_episode = [this](std::optional<std::uint64_t> episode) { return Begin(episode); };
+  served.begin_episode = [this](const execution::EpisodeRequest& asked) { return Begin(asked); };
   served.judge = [this] { return Judge(); };
   served.after_transfer = [this](const MotionResult& /*result*/) {
     if (!arrived_ && recorder_) recorder_->MarkStart(runner_.environment().robot().Time());
@@ -52,15 +56,20 @@ execution::ServedRobot ServedEpisodes::Robot() {
   return served;
 }
 
-execution::EpisodeReply ServedEpisodes::Begin(std::optional<std::uint64_t> episode) {
-  const std::int64_t number = episode ? static_cast<std::int64_t>(*episode) : current_ + 1;
+execution::EpisodeReply ServedEpisodes::Begin(const execution::EpisodeRequest& asked) {
+  const std::int64_t number = asked.episode ? static_cast<std::int64_t>(*asked.episode) : current_ + 1;
   if (number < 0 || number >= episodes_) {
     throw NegativeResult("episodes", fmt::format("number {} of {} (from 0) is not offered", number, episodes_),
                          "start the simulation with more --episodes");
   }
+  std::optional<planner::Extents> extents;
+  if (any_extents_ && !asked.extents.empty()) {
+    extents = planner::FromCounts(asked.extents);
+    planner::RequireWithinTask({{*extents}, ""}, runner_.task());
+  }
   env::SimulatedRobot& robot = runner_.environment().robot();
   robot.SetObserver({}, 0.0);
-  record_ = runner_.Begin(static_cast<std::uint64_t>(number));
+  record_ = runner_.Begin(static_cast<std::uint64_t>(number), extents);
   current_ = number;
   arrived_ = judged_ = false;
   begun_ = true;
@@ -76,12 +85,7 @@ execution::EpisodeReply ServedEpisodes::Begin(std::optional<std::uint64_t> episo
   reply.noise = record_.noise;
   reply.placement = record_.placement;
   reply.rejected_placements = record_.rejected_placements;
-  const planner::Extents& e = record_.extents;
-  reply.extents = {e.nx, e.ny, e.nz};
-  if (e.n_yaw > 1 || e.n_pitch > 1) {
-    reply.extents.push_back(e.n_yaw);
-    reply.extents.push_back(e.n_pitch);
-  }
+  reply.extents = planner::ToCounts(record_.extents);
   reply.world_T_estimate = record_.world_T_estimate0;
   reply.contact_threshold_n = runner_.faults().robot.contact_threshold_n;
   reply.force_budget_n = runner_.force_budget_n();

@@ -16,8 +16,9 @@ namespace feeler::workflow {
 /// executor is told and what is true later are those of `EpisodeRunner::Run`, number by number. Stays where it is.
 class ServedEpisodes {
  public:
+  /// `any_extents`: an executor that asks for extents gets them; else the problems are those of the runner's family.
   /// `replay_json`: how a replay is written into the verdict; empty: none is kept.
-  ServedEpisodes(EpisodeRunner runner, std::int64_t episodes,
+  ServedEpisodes(EpisodeRunner runner, std::int64_t episodes, bool any_extents = false,
                  std::function<nlohmann::json(const Replay&)> replay_json = {});
   ServedEpisodes(const ServedEpisodes&) = delete;
   ServedEpisodes& operator=(const ServedEpisodes&) = delete;
@@ -30,11 +31,12 @@ class ServedEpisodes {
   env::InsertionEnv& environment() { return runner_.environment(); }
 
  private:
-  execution::EpisodeReply Begin(std::optional<std::uint64_t> episode);
+  execution::EpisodeReply Begin(const execution::EpisodeRequest& asked);
   execution::VerdictReply Judge();
 
   EpisodeRunner runner_;
   std::int64_t episodes_;
+  bool any_extents_;
   std::function<nlohmann::json(const Replay&)> replay_json_;
   std::unique_ptr<ReplayRecorder> recorder_;
   std::int64_t current_ = -1;

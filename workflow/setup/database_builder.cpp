@@ -69,21 +69,6 @@ policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner:
   return identity;
 }
 
-void RequireWithinTask(const planner::ProblemFamily& family, const Task& task) {
-  std::array<int, planner::kAxisKinds> largest = {1, 1, 1, 1, 1};
-  for (const UncertainAxis& axis : task.axes) largest[static_cast<std::size_t>(axis.kind)] = axis.max_cells;
-  for (const planner::Extents& extents : family.problems) {
-    for (int axis = 0; axis < planner::kAxisKinds; ++axis) {
-      const int most = largest[static_cast<std::size_t>(axis)];
-      if (extents[axis] >= 1 && extents[axis] <= most) continue;
-      throw InputError("problem " + planner::ToString(extents, task),
-                       fmt::format("task {} allows 1..{} {} along {}", task.name, most, axis < 3 ? "cells" : "angles",
-                                   ToString(static_cast<AxisKind>(axis))),
-                       "change the family, or the ranges in the task file");
-    }
-  }
-}
-
 DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFamily& family,
                             const planner::PreprocessOptions& options, const std::string& path,
                             const std::optional<policies::DatabaseShard>& shard) {

@@ -12,9 +12,6 @@ namespace feeler::workflow {
 /// What a database for this task under these options is: its identity decides whether a file may be continued.
 policies::DatabaseIdentity IdentityOf(const PlanningSetup& setup, const planner::PreprocessOptions& options);
 
-/// Throws InputError unless every problem of the family lies within the axes of the task and their largest extents.
-void RequireWithinTask(const planner::ProblemFamily& family, const Task& task);
-
 struct DatabaseBuild {
   planner::PreprocessSummary summary;
   policies::DatabaseInfo info;

@@ -91,6 +91,7 @@ struct HeartbeatRequest {};
 struct ByeRequest {};
 struct EpisodeRequest {                  ///< simulations only: a new episode begins
   std::optional<std::uint64_t> episode;  ///< default: the one after the last
+  std::vector<int> extents;              ///< asked for, 3 numbers, or 5 with angles; empty: as the simulation draws
 };
 struct VerdictRequest {};  ///< simulations only: what is true, after the end
 

@@ -88,7 +88,11 @@ struct RequestBody {
             {"duration_s", m.duration_s},
             {"contact_force_n", m.contact_force_n}};
   }
-  json operator()(const EpisodeRequest& m) const { return {{"episode", m.episode ? json(*m.episode) : json()}}; }
+  json operator()(const EpisodeRequest& m) const {
+    json item = {{"episode", m.episode ? json(*m.episode) : json()}};
+    if (!m.extents.empty()) item["extents"] = m.extents;
+    return item;
+  }
   template <class Empty>
   json operator()(const Empty& /*message*/) const {
     return json::object();
@@ -217,6 +221,12 @@ Capabilities CapabilitiesOf(const json& item) {
   return c;
 }
 
+std::vector<int> ExtentsOf(const json& item) {
+  auto extents = item.get<std::vector<int>>();
+  if (extents.size() == 4) RefuseMessage("extents are three numbers, or five");
+  return extents;
+}
+
 CompliantMotion CompliantOf(const json& item) {
   CompliantMotion motion;
   for (const json& pose : item["poses"]) motion.world_T_tool.push_back(PoseOf(pose));
@@ -266,6 +276,7 @@ Request RequestOf(const std::string& type, const json& item) {
   if (type == "episode") {
     EpisodeRequest episode;
     if (!item["episode"].is_null()) episode.episode = item["episode"].get<std::uint64_t>();
+    if (item.contains("extents")) episode.extents = ExtentsOf(item["extents"]);
     return episode;
   }
   return VerdictRequest{};
@@ -311,8 +322,7 @@ EpisodeReply EpisodeOf(const json& item) {
   m.noise = item["noise"].get<std::string>();
   m.placement = item["placement"].get<std::string>();
   m.rejected_placements = item["rejected_placements"].get<int>();
-  m.extents = item["extents"].get<std::vector<int>>();
-  if (m.extents.size() == 4) RefuseMessage("extents are three numbers, or five");
+  m.extents = ExtentsOf(item["extents"]);
   m.world_T_estimate = PoseOf(item["estimate"]);
   m.contact_threshold_n = item["contact_threshold_n"].get<double>();
   m.force_budget_n = item["force_budget_n"].get<double>();

@@ -29,10 +29,10 @@ class Cell {
     options.lockstep = true;
     ServedRobot served = robot.Served();
     if (simulated) {
-      served.begin_episode = [](std::optional<std::uint64_t> episode) {
+      served.begin_episode = [](const EpisodeRequest& asked) {
         EpisodeReply reply;
-        reply.episode = episode.value_or(0);
-        reply.extents = {2, 2, 2};
+        reply.episode = asked.episode.value_or(0);
+        reply.extents = asked.extents.empty() ? std::vector<int>{2, 2, 2} : asked.extents;
         return reply;
       };
     }
@@ -232,7 +232,7 @@ TEST(WireFaults, NonsenseEndsTheSessionAndNoFurtherMotionIsSent) {
     Cell cell(options, true);
     const auto remote = cell.Remote();
     remote->Start();
-    remote->BeginEpisode(3);
+    EXPECT_EQ(remote->BeginEpisode(3).extents, (std::vector<int>{2, 2, 2}));
     int good = 0;
     MotionResult ended;
     for (int i = 0; i < 20; ++i) {

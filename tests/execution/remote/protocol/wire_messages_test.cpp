@@ -54,6 +54,8 @@ std::vector<Request> SomeRequests() {
           ByeRequest{},
           EpisodeRequest{7},
           EpisodeRequest{},
+          EpisodeRequest{7, {5, 4, 3}},
+          EpisodeRequest{{}, {5, 4, 3, 2, 6}},
           VerdictRequest{}};
 }
 
