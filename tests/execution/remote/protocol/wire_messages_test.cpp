@@ -52,7 +52,7 @@ std::vector<Request> SomeRequests() {
           RecoverRequest{},
           HeartbeatRequest{},
           ByeRequest{},
-          EpisodeRequest{7},
+          EpisodeRequest{7, {}},
           EpisodeRequest{},
           EpisodeRequest{7, {5, 4, 3}},
           EpisodeRequest{{}, {5, 4, 3, 2, 6}},
