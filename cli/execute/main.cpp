@@ -34,9 +34,8 @@ struct Tally {
   int links_lost = 0;
   std::vector<double> times_s;
   double peak_force_n = 0.0;
-  double robot_time_s = 0.0;
-  double clock_s = 0.0;  ///< of the robot, transfers to the start poses included
-  double clock_wall_s = 0.0;
+  double robot_time_s = 0.0;  ///< on the robot's clock, transfers to the start poses included
+  double robot_wall_s = 0.0;  ///< what passed here meanwhile
   std::map<std::string, int> failures;
 };
 
@@ -45,9 +44,8 @@ void Count(const ExecutedEpisode& episode, Tally& tally) {
   tally.links_lost += episode.link_lost ? 1 : 0;
   tally.believed_inserted += episode.execution.believed_inserted ? 1 : 0;
   tally.peak_force_n = std::max(tally.peak_force_n, episode.line.peak_force_n);
-  tally.robot_time_s += episode.execution.sim_time_s;
-  tally.clock_s += episode.robot_s;
-  tally.clock_wall_s += episode.wall_s;
+  tally.robot_time_s += episode.robot_s;
+  tally.robot_wall_s += episode.wall_s;
   const bool judged = episode.line.inserted.has_value();
   tally.judged += judged ? 1 : 0;
   tally.localized += episode.line.localized.value_or(false) ? 1 : 0;
@@ -72,8 +70,10 @@ nlohmann::json Summary(const Tally& tally, const Executing& executing, double wa
           {"believed_inserted", tally.believed_inserted},
           {"sim_time_median_s", times.empty() ? unknown : nlohmann::json(times[times.size() / 2])},
           {"robot_time_s", tally.robot_time_s},
+          {"robot_wall_s", tally.robot_wall_s},
+          {"wall_per_robot_time",
+           tally.robot_time_s > 0.0 ? nlohmann::json(tally.robot_wall_s / tally.robot_time_s) : unknown},
           {"wall_s", wall_s},
-          {"wall_per_robot_time", tally.clock_s > 0.0 ? nlohmann::json(tally.clock_wall_s / tally.clock_s) : unknown},
           {"peak_force_max_n", tally.peak_force_n},
           {"links_lost", tally.links_lost},
           {"failures", tally.failures}};
