@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -32,10 +31,10 @@
 #include "feeler/evaluation/records/merge_records.h"
 #include "feeler/evaluation/records/run_summary.h"
 #include "feeler/evaluation/records/scene_geometry.h"
-#include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/storage/hash.h"
 #include "feeler/version.h"
 #include "feeler/workflow/episode/episode.h"
+#include "feeler/workflow/episode/episode_draw.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/episode_video.h"
 #include "feeler/workflow/perception/perceive_table.h"
@@ -106,25 +105,6 @@ void RequireSane(const RunFlags& flags) {
   if (!flags.versus.empty() && flags.video.empty()) {
     throw InputError("--versus", "is about the video, and there is none", "add --video FILE.mp4");
   }
-}
-
-/// The problems that episodes draw from: the one given, else all that the database has a policy for, else the task's.
-planner::ProblemFamily FamilyFor(const RunFlags& flags, const Task& task, policies::Database* database) {
-  if (!flags.extents.empty()) {
-    planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
-    planner::RequireWithinTask(family, task);
-    return family;
-  }
-  if (database == nullptr) return planner::FamilyOf(task);
-  planner::ProblemFamily family;
-  family.spec = database->path();
-  for (const policies::StoredProblem& problem : database->List()) {
-    if (std::isfinite(problem.expected_cost)) family.problems.push_back(problem.extents);
-  }
-  if (family.problems.empty()) {
-    throw InputError(database->path(), "holds no policy", "fill it with feeler preprocess");
-  }
-  return family;
 }
 
 std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::string& table,
@@ -217,7 +197,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
 
   workflow::EpisodeOptions options;
   options.seed = flags.seed;
-  options.family = FamilyFor(flags, setup->task(), database.get());
+  options.family = workflow::FamilyToDrawFrom(flags.extents, database.get(), setup->task());
   options.noise = flags.noise;
   options.placement = placement;
   if (!flags.perception.empty()) options.perception = PerceptionFor(flags.table, *setup);

@@ -1,7 +1,6 @@
 // feeler simulate: the simulated robot behind the wire protocol.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -16,8 +15,8 @@
 #include "feeler/evaluation/records/replay_json.h"
 #include "feeler/execution/remote/robot_server.h"
 #include "feeler/execution/remote/token_file.h"
-#include "feeler/planner/family/problem_family.h"
 #include "feeler/workflow/episode/episode.h"
+#include "feeler/workflow/episode/episode_draw.h"
 #include "feeler/workflow/episode/episode_faults.h"
 #include "feeler/workflow/episode/served_episodes.h"
 
@@ -40,22 +39,6 @@ struct SimulatorFlags {
   bool no_replay = false;
   bool json = false;
 };
-
-planner::ProblemFamily FamilyOf(const SimulatorFlags& flags, const Task& task, policies::Database* database) {
-  if (!flags.extents.empty()) {
-    planner::ProblemFamily family{{planner::ParseExtents(flags.extents, task)}, flags.extents};
-    planner::RequireWithinTask(family, task);
-    return family;
-  }
-  if (database == nullptr) return planner::FamilyOf(task);
-  planner::ProblemFamily family;
-  family.spec = database->path();
-  for (const policies::StoredProblem& problem : database->List()) {
-    if (std::isfinite(problem.expected_cost)) family.problems.push_back(problem.extents);
-  }
-  if (family.problems.empty()) throw InputError(database->path(), "holds no policy", "fill it with feeler preprocess");
-  return family;
-}
 
 nlohmann::json Summary(const execution::RobotServer& server) {
   const execution::ServerStatistics& s = server.statistics();
@@ -110,7 +93,7 @@ void Simulate(const SimulatorFlags& flags, Session& session) {
       std::make_shared<const workflow::PlanningSetup>(workflow::LoadPlanningSetup(flags.task, setup_options));
   map_bar.Finish();
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
-  episodes.family = FamilyOf(flags, setup->task(), database.get());
+  episodes.family = workflow::FamilyToDrawFrom(flags.extents, database.get(), setup->task());
 
   std::function<nlohmann::json(const workflow::Replay&)> replay_json;
   if (!flags.no_replay) {

@@ -1,7 +1,6 @@
 // Seeded episodes in simulation: feeler.run.
 #include "episodes.h"
 
-#include <cmath>
 #include <mutex>
 
 #include "common.h"
@@ -11,26 +10,12 @@
 #include "feeler/policies/database_policy.h"
 #include "feeler/policies/storage/database.h"
 #include "feeler/workflow/episode/episode.h"
+#include "feeler/workflow/episode/episode_draw.h"
 #include "feeler/workflow/perception/perceive_table.h"
 #include "feeler/workflow/setup/policy_registry.h"
 #include "robot.h"
 
 namespace feeler::python {
-planner::ProblemFamily FamilyFor(const nb::object& extents, const Task& task, policies::Database* database) {
-  if (!extents.is_none()) {
-    const planner::Extents one = ToExtents(extents, task);
-    return {{one}, planner::ToString(one, task)};
-  }
-  if (database == nullptr) return planner::FamilyOf(task);
-  planner::ProblemFamily family;
-  family.spec = database->path();
-  for (const policies::StoredProblem& problem : database->List()) {
-    if (std::isfinite(problem.expected_cost)) family.problems.push_back(problem.extents);
-  }
-  if (family.problems.empty()) throw InputError(database->path(), "holds no policy", "fill it with feeler.preprocess");
-  return family;
-}
-
 workflow::PolicyFactory FactoryFor(const nb::object& policy, const std::shared_ptr<policies::Database>& database,
                                    const std::vector<std::string>& options, const std::shared_ptr<Raised>& raised) {
   std::string name;
@@ -85,7 +70,7 @@ nb::tuple Run(PlanningTask& task, const nb::object& policy, const std::shared_pt
   const auto setup = task.Setup(jobs, nb::none());
   if (database) database->RequireFingerprint(setup->task().name, setup->fingerprint);
   options.seed = seed;
-  options.family = FamilyFor(extents, setup->task(), database.get());
+  options.family = workflow::FamilyToDrawFrom(ExtentsText(extents), database.get(), setup->task());
   options.noise = noise;
   if (!table.empty()) options.perception = PerceptionFor(table, *setup);
   options.ladder = ladder.value_or(!named || workflow::UsesLadder(name));

@@ -11,9 +11,6 @@
 
 namespace feeler::python {
 
-/// The problems that episodes draw from, as `feeler run` chooses them.
-planner::ProblemFamily FamilyFor(const nb::object& extents, const Task& task, policies::Database* database);
-
 /// Makes the policy of each episode: a named one, a graph, or one of Python.
 workflow::PolicyFactory FactoryFor(const nb::object& policy, const std::shared_ptr<policies::Database>& database,
                                    const std::vector<std::string>& options, const std::shared_ptr<Raised>& raised);

@@ -34,7 +34,9 @@ class PlanningTask {
   std::shared_ptr<const workflow::PlanningSetup> setup_;
 };
 
-/// Hypotheses per axis of the task, from a text ("7x7x5") or a sequence of counts.
+/// "7x7x5" of a text or a sequence of counts; empty for None.
+std::string ExtentsText(const nb::object& extents);
+/// Hypotheses per axis of the task, from the same.
 planner::Extents ToExtents(const nb::object& extents, const Task& task);
 planner::ProblemFamily ToFamily(const nb::object& family, const Task& task);
 

@@ -6,15 +6,19 @@
 
 namespace feeler::python {
 
-planner::Extents ToExtents(const nb::object& extents, const Task& task) {
+std::string ExtentsText(const nb::object& extents) {
+  if (extents.is_none()) return "";
   std::string text;
-  if (!nb::try_cast(extents, text)) {
-    std::vector<int> counts;
-    if (!nb::try_cast(extents, counts)) {
-      throw InputError("extents", "are no counts", "give one per axis of the task, e.g. (7, 7, 5), or \"7x7x5\"");
-    }
-    text = fmt::format("{}", fmt::join(counts, "x"));
+  std::vector<int> counts;
+  if (!nb::try_cast(extents, text) && nb::try_cast(extents, counts)) text = fmt::format("{}", fmt::join(counts, "x"));
+  if (text.empty()) {
+    throw InputError("extents", "are no counts", "give one per axis of the task, e.g. (7, 7, 5), or \"7x7x5\"");
   }
+  return text;
+}
+
+planner::Extents ToExtents(const nb::object& extents, const Task& task) {
+  const std::string text = ExtentsText(extents);
   const planner::Extents result = planner::ParseExtents(text, task);
   planner::RequireWithinTask({{result}, text}, task);
   return result;

@@ -108,7 +108,7 @@ nb::list RecordTracks(PlanningTask& task, const nb::object& policy, const std::s
   Track track;
   workflow::EpisodeOptions options;
   options.seed = seed;
-  options.family = FamilyFor(extents, setup->task(), database.get());
+  options.family = workflow::FamilyToDrawFrom(ExtentsText(extents), database.get(), setup->task());
   options.noise = noise;
   options.wrap_robot = [&track](env::SimulatedRobot& robot) { return std::make_unique<Labelled>(robot, track); };
   const ProgressCallback report = ToProgress(progress, token);

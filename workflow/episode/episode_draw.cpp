@@ -37,6 +37,22 @@ std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid) {
   return planner::ExtentsPerAxis(planner::AxesOf(task), cuboid);
 }
 
+planner::ProblemFamily FamilyToDrawFrom(const std::string& extents, policies::Database* database, const Task& task) {
+  if (!extents.empty()) {
+    planner::ProblemFamily family{{planner::ParseExtents(extents, task)}, extents};
+    planner::RequireWithinTask(family, task);
+    return family;
+  }
+  if (database == nullptr) return planner::FamilyOf(task);
+  planner::ProblemFamily family;
+  family.spec = database->path();
+  for (const policies::StoredProblem& problem : database->List()) {
+    if (std::isfinite(problem.expected_cost)) family.problems.push_back(problem.extents);
+  }
+  if (family.problems.empty()) throw InputError(database->path(), "holds no policy", "fill it with feeler preprocess");
+  return family;
+}
+
 planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t seed, std::uint64_t episode) {
   if (family.problems.empty()) throw InputError("episodes", "no problem to draw from", "give --extents or a database");
   RandomStream problem(seed, episode, "problem");

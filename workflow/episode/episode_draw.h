@@ -10,6 +10,7 @@
 #include "feeler/core/task.h"
 #include "feeler/env/scene/physics_variation.h"
 #include "feeler/planner/family/problem_family.h"
+#include "feeler/policies/storage/database.h"
 #include "feeler/workflow/episode/episode_faults.h"
 
 namespace feeler::workflow {
@@ -35,6 +36,10 @@ struct EpisodeDraw {
 
 /// Hypotheses per axis of the task, in the order of its axes.
 std::vector<int> AxisExtents(const Task& task, const planner::Extents& cuboid);
+
+/// The problems that episodes draw from: that of `extents` ("7x7x7"), which must lie within the task; where it is empty
+/// all that the database has a policy for; without a database the task's. Throws InputError.
+planner::ProblemFamily FamilyToDrawFrom(const std::string& extents, policies::Database* database, const Task& task);
 
 /// The problem that episode k of a seed meets: uniform in the family. Throws InputError for an empty family.
 planner::Extents DrawProblem(const planner::ProblemFamily& family, std::uint64_t seed, std::uint64_t episode);
