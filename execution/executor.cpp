@@ -1,5 +1,6 @@
 #include "feeler/execution/executor.h"
 
+#include <algorithm>
 #include <exception>
 #include <string>
 
@@ -20,6 +21,16 @@ void Check(const Task& task, const planner::Problem& problem) {
     throw InputError("executor", "the cell size of the task is not positive", "give a positive resolution");
 }
 
+/// Nothing was ever touched: what is believed of the target was never compared with it, and there may be none.
+void DoubtUntouched(const ExecutorOptions& options, ExecutionRecord& record) {
+  const auto touched = [&](const MoveRecord& move) {
+    return move.contact || move.peak_force_n >= options.contact_force_n;
+  };
+  if (std::any_of(record.moves.begin(), record.moves.end(), touched)) return;
+  if (record.believed_inserted) record.reason = "no contact was met: is the target there?";
+  record.believed_inserted = record.believed_localized = false;
+}
+
 }  // namespace
 
 Pose LatticeStartPose(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate) {
@@ -36,14 +47,14 @@ ExecutionRecord Execute(const Task& task, const planner::Problem& problem, const
   try {
     if (HasAngles(problem) && options.travel_model) {
       record.reason = RunPoseAttempt(episode, problem, world_T_estimate, policy, *options.travel_model);
-      record.sim_time_s = robot.Time() - episode.started_s;
-      return record;
+    } else {
+      const Attempt attempt = RunAttempt(episode, problem, world_T_estimate, policy);
+      record.reason = attempt.reason;
+      if (options.ladder && attempt.end != AttemptEnd::kInserted) {
+        record.reason = ClimbLadder(episode, problem, world_T_estimate, attempt);
+      }
     }
-    const Attempt attempt = RunAttempt(episode, problem, world_T_estimate, policy);
-    record.reason = attempt.reason;
-    if (options.ladder && attempt.end != AttemptEnd::kInserted) {
-      record.reason = ClimbLadder(episode, problem, world_T_estimate, attempt);
-    }
+    DoubtUntouched(options, record);
   } catch (const ExecutionFailure& failure) {
     record.reason = failure.what();
   } catch (const InputError&) {

@@ -1,11 +1,14 @@
 #include "feeler/cli/execute/executing.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <ctime>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include "feeler/cli/common/console.h"
@@ -29,6 +32,10 @@ using execution::ExecutorOptions;
 constexpr std::int64_t kOutsideExpansions = 3000;
 constexpr const char* kListen = "listen:";
 constexpr double kRedial_s = 10.0;
+/// A sensor that tells contacts late may raise the force budget of the task so many times, unasked.
+constexpr double kMostRise = 2.0;
+
+std::string UtcNow() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 execution::CellFile CellOf(const ExecuteFlags& flags) {
   return flags.cell.empty() ? execution::CellFile{} : execution::ReadCellFile(flags.cell);
@@ -53,8 +60,20 @@ Executing::Executing(const ExecuteFlags& flags, const Session& session)
                      "was measured with the tool of '" + cell_.tool + "', not of '" + bundle_.task.name + "'",
                      "calibrate with the tool that is held");
   }
+  if (!flags.extents.empty()) {
+    asked_ = planner::ParseExtents(flags.extents, bundle_.task);
+    planner::RequireWithinTask({{*asked_}, flags.extents}, bundle_.task);
+  }
   robot_ = Dial();
   FindArm();
+  if (!cell_.robot.empty() && cell_.robot != welcome().robot) {
+    throw InputError(flags.cell, "is of the robot '" + cell_.robot + "', and here is '" + welcome().robot + "'",
+                     "calibrate this cell");
+  }
+  if (welcome().simulated && !flags.estimate.empty()) {
+    throw InputError("--estimate", "a simulation says itself where the target is believed to stand",
+                     "leave --estimate out");
+  }
   if (!welcome().simulated) {
     if (flags.estimate.empty()) {
       throw InputError("--estimate", "missing: a robot does not say where the target is",
@@ -62,10 +81,7 @@ Executing::Executing(const ExecuteFlags& flags, const Session& session)
     }
     if (flags.extents.empty())
       throw InputError("--extents", "missing", "say how uncertain the estimate is, e.g. 7x7x7");
-    if (!cell_.robot.empty() && cell_.robot != welcome().robot) {
-      throw InputError(flags.cell, "is of the robot '" + cell_.robot + "', and here is '" + welcome().robot + "'",
-                       "calibrate this cell");
-    }
+    if (flags.box.empty() && !cell_.box) Note("feeler: no workspace box is given: the robot's own limits hold\n");
   }
 }
 
@@ -98,7 +114,9 @@ std::unique_ptr<execution::RemoteRobot> Executing::Dial() {
   options.token = execution::ReadTokenFile(flags_.token_file);
   options.form = flags_.wire == "numbers" ? execution::WireForm::kNumbers : execution::WireForm::kJson;
   options.heartbeat_s = flags_.heartbeat_s;
+  options.link_timeout_s = flags_.link_timeout_s;
   options.cancellation = session_.cancellation;
+  options.measured = {cell_.stiffness_n_m, cell_.reaction_time_s, cell_.force_noise_n};
   if (!flags_.robot.starts_with(kListen)) {
     const execution::Address address = execution::ParseAddress("--robot", flags_.robot);
     return std::make_unique<execution::RemoteRobot>(execution::Connect(address, kRedial_s), options);
@@ -117,7 +135,14 @@ std::unique_ptr<execution::RemoteRobot> Executing::Dial() {
     if (session_.cancellation->cancelled()) throw WorldError("robot", "nobody dialled in", "start the robot's program");
     constexpr double kLook_s = 0.2;
     if (auto connection = listener_->Accept(kLook_s)) {
-      return std::make_unique<execution::RemoteRobot>(std::move(*connection), options);
+      try {
+        return std::make_unique<execution::RemoteRobot>(std::move(*connection), options);
+      } catch (const WorldError& error) {
+        Note("feeler: who dialled in is turned away: {}\n", error.what());
+      } catch (const InputError& error) {
+        if (!std::string_view(error.what()).starts_with("robot message")) throw;  // a robot, but none to work with
+        Note("feeler: who dialled in is turned away: {}\n", error.what());
+      }
     }
   }
 }
@@ -145,16 +170,18 @@ std::int64_t Executing::most() const {
   return welcome().simulated ? kAll : 1;
 }
 
+void Executing::RecoverIfStopped() {
+  if (robot_->State().mode != execution::RobotMode::kProtectiveStop) return;
+  if (flags_.recover == "never") throw NegativeResult("robot", "is in a protective stop", "look at it, then recover");
+  if (!operator_.Agrees("The robot is in a protective stop. Look at it; press Enter to recover: ")) {
+    throw NegativeResult("robot", "is in a protective stop, and nobody recovered it", "look at it, then recover");
+  }
+  robot_->Recover();
+}
+
 void Executing::Start() {
   if (flags_.dry_run) return;
-  const execution::RobotMode mode = robot_->State().mode;
-  if (mode == execution::RobotMode::kProtectiveStop) {
-    if (flags_.recover == "never") throw NegativeResult("robot", "is in a protective stop", "look at it, then recover");
-    if (!operator_.Agrees("The robot is in a protective stop. Look at it; press Enter to recover: ")) {
-      throw NegativeResult("robot", "is in a protective stop, and nobody recovered it", "look at it, then recover");
-    }
-    robot_->Recover();
-  }
+  RecoverIfStopped();
   if (!welcome().simulated && !flags_.start) {
     const std::string question = fmt::format(
         "{} is about to move ({}). Is the cell clear, and the stop at hand? Press Enter to start: ", welcome().robot,
@@ -167,22 +194,32 @@ void Executing::Start() {
   started_ = true;
 }
 
+void Executing::RequireSound() const {
+  const std::string lost = robot_->lost();
+  if (welcome().simulated || lost.empty()) return;
+  if (robot_->spoke_nonsense()) throw InputError("robot", lost, "see its program");
+  throw WorldError("robot", "link lost: " + lost, "see that it runs and that the network holds");
+}
+
+EpisodeReply Executing::ToldByOperator() const {
+  EpisodeReply told;
+  told.task = bundle_.task.name;
+  told.noise = "real";
+  told.placement = "estimate";
+  told.extents = planner::ToCounts(*asked_);
+  told.world_T_estimate = ParseEstimate(flags_.estimate);
+  told.contact_threshold_n = cell_.contact_force_n.value_or(welcome().capabilities.contact_force_n);
+  told.episode = static_cast<std::uint64_t>(done_);
+  return told;
+}
+
 std::optional<EpisodeReply> Executing::Told() {
-  const planner::Extents asked =
-      flags_.extents.empty() ? planner::Extents{} : planner::ParseExtents(flags_.extents, bundle_.task);
-  planner::RequireWithinTask({{asked}, flags_.extents}, bundle_.task);
   if (!welcome().simulated) {
-    EpisodeReply told;
-    told.task = bundle_.task.name;
-    told.noise = "real";
-    told.placement = "estimate";
-    told.extents = planner::ToCounts(asked);
-    told.world_T_estimate = ParseEstimate(flags_.estimate);
-    told.contact_threshold_n = cell_.contact_force_n.value_or(welcome().capabilities.contact_force_n);
-    told.episode = static_cast<std::uint64_t>(done_);
-    return told;
+    if (!robot_->lost().empty()) return std::nullopt;
+    if (done_ > 0) RecoverIfStopped();
+    return ToldByOperator();
   }
-  const std::vector<int> wished = flags_.extents.empty() ? std::vector<int>{} : planner::ToCounts(asked);
+  const std::vector<int> wished = asked_ ? planner::ToCounts(*asked_) : std::vector<int>{};
   EpisodeReply told;
   for (;;) {
     try {
@@ -198,7 +235,7 @@ std::optional<EpisodeReply> Executing::Told() {
                      "simulates the task '" + told.task + "', the database is of '" + bundle_.task.name + "'",
                      "give the database of that task");
   }
-  if (!flags_.extents.empty() && !(planner::FromCounts(told.extents) == asked)) {
+  if (asked_ && !(planner::FromCounts(told.extents) == *asked_)) {
     throw InputError("--extents",
                      "are " + flags_.extents + ", and the simulation draws from " +
                          planner::ToString(planner::FromCounts(told.extents)),
@@ -223,13 +260,26 @@ std::unique_ptr<policies::Policy> Executing::PolicyFor(const planner::Extents& e
   return std::make_unique<policies::OnlinePolicy>(online, tables_);
 }
 
+double Executing::BudgetFor(double contact_threshold_n) const {
+  constexpr double kAboveThreshold = 1.2;
+  const double task_n = bundle_.task.force_budget_n;
+  const double needed_n = kAboveThreshold * contact_threshold_n;
+  if (needed_n > kMostRise * task_n) {
+    throw InputError("--force-budget",
+                     fmt::format("the sensor tells contacts from {:g} N on, and the task allows {:g} N",
+                                 contact_threshold_n, task_n),
+                     "mend the contact force of the robot or the cell file, or give a budget that the parts stand");
+  }
+  if (needed_n > task_n) Note("feeler: the force budget is {:.1f} N: the sensor tells no contact below\n", needed_n);
+  return std::max(task_n, needed_n);
+}
+
 ExecutorOptions Executing::OptionsFor(const EpisodeReply& told, bool angles) const {
   ExecutorOptions options = execution::OptionsForThreshold(told.contact_threshold_n);
   // What the operator asks for; what a simulation states; what the task says, above what the sensor needs.
   options.force_budget_n = flags_.force_budget_n > 0.0 ? flags_.force_budget_n
-                           : told.force_budget_n > 0.0
-                               ? told.force_budget_n
-                               : std::max(bundle_.task.force_budget_n, 1.2 * told.contact_threshold_n);
+                           : told.force_budget_n > 0.0 ? told.force_budget_n
+                                                       : BudgetFor(told.contact_threshold_n);
   options.ladder = !flags_.no_ladder;
   options.online_planner = online_planner_;
   if (angles) options.travel_model = policies::TravelModelOf(bundle_);
@@ -270,7 +320,7 @@ execution::SafetyLimits Executing::LimitsFor(const ExecutorOptions& options) {
 
 void Executing::Judge(const EpisodeReply& told, ExecutedEpisode& episode) {
   execution::EpisodeLine& line = episode.line;
-  line.reason = episode.execution.reason;
+  line.reason = (flags_.dry_run ? "dry run, as if: " : "") + episode.execution.reason;
   line.peak_force_n = episode.execution.peak_force_n;
   if (!welcome().simulated || flags_.dry_run) return;
   if (episode.link_lost && !Redial()) return;
@@ -312,6 +362,8 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   execution::EpisodeLine& line = episode.line;
   line.task = bundle_.task.name;
   line.noise = told->noise;
+  line.dry = flags_.dry_run;
+  if (!welcome().simulated) line.started = UtcNow();
   line.seed = told->seed;
   line.episode = told->episode;
   line.placement = told->placement;
@@ -341,7 +393,8 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   if (flags_.dry_run || flags_.step) {
     robot.SetAsk([&](const execution::PlannedMotion& motion) -> std::string {
       const std::string text = execution::Describe(motion, behind.ToolPose());
-      if (flags_.dry_run) Print("{}\n", text);
+      if (flags_.dry_run && flags_.json) Note("{}\n", text);
+      if (flags_.dry_run && !flags_.json) Print("{}\n", text);
       if (!flags_.step) return "";
       return operator_.Agrees(text + "  [Enter: go, anything else: stop] ") ? "" : "the operator said no";
     });

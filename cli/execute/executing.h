@@ -42,15 +42,23 @@ class Executing {
   std::int64_t most() const;
   /// The operator's start, where one is needed.
   void Start();
-  /// The next one; empty where the simulation offers no more.
+  /// The next one; empty where the simulation offers no more, and where a robot can do no more.
   std::optional<ExecutedEpisode> RunNext();
+  /// Throws what ended the work of a robot that is no simulation: InputError if it said what cannot be, else
+  /// WorldError.
+  void RequireSound() const;
   void Bye() { robot_->Bye(); }
 
  private:
   std::unique_ptr<execution::RemoteRobot> Dial();
   bool Redial();
+  /// Asks the operator until a protective stop is recovered from. Throws NegativeResult where nobody does.
+  void RecoverIfStopped();
   std::optional<execution::EpisodeReply> Told();
+  execution::EpisodeReply ToldByOperator() const;
   std::unique_ptr<policies::Policy> PolicyFor(const planner::Extents& extents);
+  /// The task's, or what the sensor needs. Throws InputError where that is far more.
+  double BudgetFor(double contact_threshold_n) const;
   execution::ExecutorOptions OptionsFor(const execution::EpisodeReply& told, bool angles) const;
   execution::SafetyLimits LimitsFor(const execution::ExecutorOptions& options);
   void FindArm();
@@ -69,6 +77,7 @@ class Executing {
   std::unique_ptr<execution::Listener> listener_;  ///< where the robot dials in
   std::unique_ptr<execution::RemoteRobot> robot_;
   std::optional<execution::ArmCheck> arm_;
+  std::optional<planner::Extents> asked_;  ///< --extents
   bool started_ = false;
   std::int64_t done_ = 0;
 };

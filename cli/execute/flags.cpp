@@ -65,6 +65,8 @@ void AddExecuteFlags(CLI::App& app, ExecuteFlags& flags) {
       ->check(CLI::IsMember({"ask", "never"}))
       ->capture_default_str();
   AddReal(app, "--heartbeat", flags.heartbeat_s, 0.001, 1.0, "s between heartbeats to the robot");
+  AddReal(app, "--link-timeout", flags.link_timeout_s, 0.02, 60.0,
+          "a robot that may be silent for longer is refused, s (simulations say themselves)");
   app.add_option("--token-file", flags.token_file, "file with the token that the robot asks for");
   app.add_option("--out", flags.out, "records, one JSON object a line (docs/file-formats.md)");
   app.add_flag("--live", flags.live, "tell of every motion on standard error (the default on a terminal)");

@@ -28,6 +28,7 @@ struct ExecuteFlags {
   double confirm_limit_m = 0.0;  ///< 0: the executor's
   double force_budget_n = 0.0;   ///< 0: the executor's
   double heartbeat_s = 0.02;
+  double link_timeout_s = 0.1;
   bool no_ladder = false;
   bool dry_run = false;
   bool step = false;

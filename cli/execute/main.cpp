@@ -100,6 +100,10 @@ void Run(const ExecuteFlags& flags, Session& session) {
   if (out && tally.episodes > 0) out->Commit();
   if (flags.json) PrintJson(Summary(tally, executing, execution::MonotonicSeconds() - wall_start_s));
   if (session.cancellation->cancelled()) session.exit_code = 1;
+  executing.RequireSound();
+  // A simulation counts; on a robot somebody waits for the part to be in.
+  if (!executing.welcome().simulated && !flags.dry_run && tally.believed_inserted < tally.episodes)
+    session.exit_code = 1;
 }
 
 }  // namespace

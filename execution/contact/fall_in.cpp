@@ -36,7 +36,7 @@ std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Pro
 }
 
 /// The walls of an opening hold a tool that is inside.
-constexpr MayMeet kInside{.long_wall = true, .edge_towards = std::nullopt};
+const MayMeet kInside{.long_wall = true, .edge_towards = std::nullopt};
 
 /// Middle between the walls on both sides along `axis`; empty if one is missing. The tool ends in the middle.
 std::optional<double> MiddleBetweenWalls(const Task& task, int axis, Mover& mover) {

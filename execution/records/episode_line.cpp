@@ -87,6 +87,8 @@ ordered_json ToJson(const EpisodeLine& line, const ExecutionRecord& execution) {
   json["noise"] = line.noise;
   if (!line.fault_values.empty()) json["fault_values"] = line.fault_values;
   if (!line.contact_parameters.empty()) json["contact_parameters"] = line.contact_parameters;
+  if (!line.started.empty()) json["started"] = line.started;
+  if (line.dry) json["dry"] = true;
   json["seed"] = line.seed;
   json["episode"] = line.episode;
   json["placement"] = line.placement;

@@ -29,6 +29,9 @@ struct EpisodeLine {
   std::string noise;
   std::map<std::string, double> fault_values;        ///< what faults with ranges came to, in their units
   std::map<std::string, double> contact_parameters;  ///< how contact feels in this simulation; empty: not known
+  std::string
+      started;       ///< of a real robot: when, "2026-11-29T17:40:12Z"; empty: a simulation, which seed and number tell
+  bool dry = false;  ///< nothing moved: what would be done if the target stood at its estimate
   std::uint64_t seed = 0;
   std::uint64_t episode = 0;
   std::string placement;

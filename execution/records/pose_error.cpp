@@ -6,6 +6,10 @@
 
 namespace feeler::execution {
 
+double AngleBetween(const Pose& a, const Pose& b) {
+  return Eigen::AngleAxisd(Eigen::Matrix3d(a.linear().transpose() * b.linear())).angle();
+}
+
 PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose) {
   const Pose difference = reference.inverse() * pose;
   const int along = AxisOf(task.insertion);

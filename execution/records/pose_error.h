@@ -13,6 +13,9 @@ struct PoseError {
   double angle_rad = 0.0;          ///< of the turns that matter to the insertion (InsertionAngle)
 };
 
+/// Of the turn from one orientation to the other, 0 to pi.
+double AngleBetween(const Pose& a, const Pose& b);
+
 /// How far `pose` is from `reference`, in the axes of `reference`.
 PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose);
 

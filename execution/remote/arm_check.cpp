@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "feeler/core/random.h"
+#include "feeler/execution/records/pose_error.h"
 
 namespace feeler::execution {
 namespace {
@@ -24,10 +25,6 @@ constexpr double kJump_rad = 0.35;
 /// A slow motion must be able to give way, too.
 constexpr double kLeastSpeed_m_s = 0.02;
 constexpr int kRestarts = 64;
-
-double AngleBetween(const Pose& a, const Pose& b) {
-  return std::abs(Eigen::AngleAxisd(Eigen::Matrix3d(a.linear().transpose() * b.linear())).angle());
-}
 
 Pose Between(const Pose& from, const Pose& to, double share) {
   const Eigen::Quaterniond a(from.linear());

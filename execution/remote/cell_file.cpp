@@ -1,5 +1,7 @@
 #include "feeler/execution/remote/cell_file.h"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "feeler/core/error.h"
@@ -24,8 +26,10 @@ Eigen::Vector3d VectorAt(const JsonField& field) {
           field[std::size_t{2}].Number(kLeast)};
 }
 
-void ReadNumber(const JsonField& root, const char* key, double least, std::optional<double>& value) {
-  if (root.Has(key)) value = root[key].Number(least);
+void ReadNumber(const JsonField& root, const char* key, double least, double most, std::optional<double>& value) {
+  if (!root.Has(key)) return;
+  value = root[key].Number(least);
+  if (*value > most) root[key].Fail(fmt::format("is above {:g}", most), "measure again: no arm is so");
 }
 
 }  // namespace
@@ -48,11 +52,11 @@ CellFile ReadCellFile(const std::string& path) {
       root["box_min_m"].Fail("is not below box_max_m", "give the least and the greatest corner");
     }
   }
-  ReadNumber(root, "force_bias_n", 0.0, cell.force_bias_n);
-  ReadNumber(root, "force_noise_n", 0.0, cell.force_noise_n);
-  ReadNumber(root, "contact_force_n", 0.1, cell.contact_force_n);
-  ReadNumber(root, "stiffness_n_m", 1.0, cell.stiffness_n_m);
-  ReadNumber(root, "reaction_time_s", 0.0, cell.reaction_time_s);
+  ReadNumber(root, "force_bias_n", 0.0, 1000.0, cell.force_bias_n);
+  ReadNumber(root, "force_noise_n", 0.0, 100.0, cell.force_noise_n);
+  ReadNumber(root, "contact_force_n", 0.1, 500.0, cell.contact_force_n);
+  ReadNumber(root, "stiffness_n_m", 1.0, 1e8, cell.stiffness_n_m);
+  ReadNumber(root, "reaction_time_s", 0.0, 1.0, cell.reaction_time_s);
   if (root.Has("tool_offset_m")) cell.tool_offset_m = VectorAt(root["tool_offset_m"]);
   constexpr double kMostOffset_m = 0.05;
   if (cell.tool_offset_m.norm() > kMostOffset_m) {

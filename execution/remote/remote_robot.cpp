@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/execution/records/pose_error.h"
 #include "feeler/execution/remote/protocol/messages_numbers.h"
 #include "feeler/version.h"
 
@@ -19,12 +20,21 @@ constexpr double kJump_m = 0.02;
 /// Looks for a cancellation so often while it waits.
 constexpr double kLook_s = 0.05;
 constexpr double kAnyLength = 1e9;
+/// "Reached" is within this of the commanded end; so is what was travelled of the way between the poses.
+constexpr double kReached_m = 0.005;
+/// The tool turns by no more than this beside what was commanded.
+constexpr double kTurn_rad = 0.2;
+/// A motion may take this many times what its length and speed come to, and this on top.
+constexpr double kSlowness = 20.0;
+constexpr double kSpare_s = 10.0;
+/// After an order to stop, and for a motion that is overdue, the robot is waited for so long.
+constexpr double kStop_s = 1.0;
 
 [[noreturn]] void RefuseRobot(const std::string& what, const std::string& mend) {
   throw InputError("robot", what, mend);
 }
 
-void RequireSound(const WelcomeReply& welcome) {
+void RequireSound(const WelcomeReply& welcome, const RemoteOptions& options) {
   if (welcome.version != kProtocolVersion) {
     RefuseRobot(fmt::format("speaks version {} of the protocol, feeler speaks {}", welcome.version, kProtocolVersion),
                 "update the robot's program or feeler");
@@ -42,6 +52,24 @@ void RequireSound(const WelcomeReply& welcome) {
   if (!(c.workspace_min_m.array() < c.workspace_max_m.array()).all()) {
     RefuseRobot("states a workspace without room", "give its least and greatest corner");
   }
+  if (c.contact_force_n > c.max_force_n) {
+    RefuseRobot(fmt::format("tells contacts from {:g} N on, and may press with {:g} N at most", c.contact_force_n,
+                            c.max_force_n),
+                "state a contact force that the sensor can tell");
+  }
+  if (welcome.simulated) return;
+  if (welcome.lockstep) RefuseRobot("states that its time stands still", "lockstep is for simulations alone");
+  if (welcome.link_timeout_s > options.link_timeout_s) {
+    RefuseRobot(
+        fmt::format("may be silent for {:g} s, {:g} s are allowed", welcome.link_timeout_s, options.link_timeout_s),
+        "mend its program, or allow more with --link-timeout");
+  }
+}
+
+/// The text of an error without its "(how to mend)".
+std::string WithoutMend(const std::string& text) {
+  const std::size_t mend = text.rfind(" (");
+  return mend == std::string::npos || !text.ends_with(')') ? text : text.substr(0, mend);
 }
 
 }  // namespace
@@ -59,9 +87,11 @@ RemoteRobot::RemoteRobot(Connection connection, const RemoteOptions& options)
   if (status == LineStatus::kTimeout) {
     throw WorldError("robot", "does not answer hello", "is it feeler's protocol that listens there?");
   }
+  if (status == LineStatus::kTooLong) RefuseRobot("answers hello with a line without end", "see its program");
   if (status != LineStatus::kLine) throw WorldError("robot", "hung up at hello", "another session may be under way");
   const std::optional<WireForm> form = FormOf(line);
-  const Reply reply = DecodeReply(form.value_or(options_.form), line).body;
+  const Framed<Reply> answer = DecodeReply(form.value_or(options_.form), line);
+  const Reply& reply = answer.body;
   if (const auto* error = std::get_if<ErrorReply>(&reply)) {
     const char* mend = error->code == "token"  ? "give the robot's token with --token-file"
                        : error->code == "busy" ? "wait until the other session has ended"
@@ -69,8 +99,14 @@ RemoteRobot::RemoteRobot(Connection connection, const RemoteOptions& options)
     RefuseRobot("refused the session: " + error->code + ", " + error->text, mend);
   }
   if (!std::holds_alternative<WelcomeReply>(reply)) RefuseRobot("answers hello with something else", "see its program");
+  if (answer.seq != 0) RefuseRobot(fmt::format("answers hello with number {}, not 0", answer.seq), "see its program");
   welcome_ = std::get<WelcomeReply>(reply);
-  RequireSound(welcome_);
+  RequireSound(welcome_, options_);
+  if (!welcome_.lockstep && 2.0 * options_.heartbeat_s > welcome_.link_timeout_s) {
+    RefuseRobot(fmt::format("takes a link for lost after {:g} s, and a heartbeat comes every {:g} s",
+                            welcome_.link_timeout_s, options_.heartbeat_s),
+                "give a shorter --heartbeat");
+  }
   state_ = welcome_.state;
   heard_s_ = MonotonicSeconds();
   if (!welcome_.lockstep) pump_ = std::thread([this] { Pump(); });
@@ -92,10 +128,18 @@ std::string RemoteRobot::lost() const {
   return lost_;
 }
 
-void RemoteRobot::Lose(const std::string& reason) {
+bool RemoteRobot::spoke_nonsense() const {
+  const std::lock_guard lock(mutex_);
+  return nonsense_;
+}
+
+void RemoteRobot::Lose(const std::string& reason, bool nonsense) {
   {
     const std::lock_guard lock(mutex_);
-    if (lost_.empty()) lost_ = reason;
+    if (lost_.empty()) {
+      lost_ = reason;
+      nonsense_ = nonsense;
+    }
   }
   connection_.Shutdown();
   arrived_.notify_all();
@@ -160,13 +204,13 @@ bool RemoteRobot::TakeLine(double timeout_s) {
   switch (connection_.ReadLine(line, timeout_s)) {
     case LineStatus::kTimeout: return false;
     case LineStatus::kClosed: Lose("the robot hung up"); return false;
-    case LineStatus::kTooLong: Lose("a message of the robot is too long"); return false;
+    case LineStatus::kTooLong: Lose("a message of the robot is too long", true); return false;
     case LineStatus::kLine: break;
   }
   try {
     File(line);
   } catch (const InputError& error) {
-    Lose(error.what());
+    Lose(WithoutMend(error.what()), true);
     return false;
   }
   return true;
@@ -214,12 +258,18 @@ bool RemoteRobot::SendFrame(const Request& request, std::uint64_t& seq) {
   return false;
 }
 
-std::optional<Reply> RemoteRobot::Await(std::uint64_t /*seq*/, double timeout_s) {
-  const double end_s = MonotonicSeconds() + timeout_s;
+std::optional<Reply> RemoteRobot::Await(double timeout_s) {
+  double end_s = MonotonicSeconds() + timeout_s;
+  bool overdue = false;
   for (;;) {
-    if (options_.cancellation != nullptr && options_.cancellation->cancelled() && !stop_sent_) {
+    const bool cancelled = options_.cancellation != nullptr && options_.cancellation->cancelled();
+    const bool late = MonotonicSeconds() > end_s;
+    if (late && overdue) Lose(fmt::format("no reply within {:g} s", timeout_s));
+    if ((cancelled && !stop_sent_) || (late && !overdue)) {
       std::uint64_t seq = 0;
       stop_sent_ = SendFrame(StopRequest{}, seq);
+      overdue = true;
+      end_s = MonotonicSeconds() + kStop_s;
     }
     if (welcome_.lockstep) {
       TakeLine(kLook_s);
@@ -227,24 +277,20 @@ std::optional<Reply> RemoteRobot::Await(std::uint64_t /*seq*/, double timeout_s)
       std::unique_lock lock(mutex_);
       arrived_.wait_for(lock, std::chrono::duration<double>(kLook_s), [&] { return reply_ || !lost_.empty(); });
     }
-    {
-      const std::lock_guard lock(mutex_);
-      if (reply_) {
-        Reply reply = std::move(reply_->body);
-        reply_.reset();
-        return reply;
-      }
-      if (!lost_.empty()) return std::nullopt;
+    const std::lock_guard lock(mutex_);
+    if (reply_) {
+      Reply reply = std::move(reply_->body);
+      reply_.reset();
+      return reply;
     }
-    if (MonotonicSeconds() > end_s) Lose(fmt::format("no reply within {:g} s", timeout_s));
+    if (!lost_.empty()) return std::nullopt;
   }
 }
 
-std::optional<Reply> RemoteRobot::TryExchange(const Request& request) {
+std::optional<Reply> RemoteRobot::TryExchange(const Request& request, double timeout_s) {
   std::uint64_t seq = 0;
   if (!SendFrame(request, seq)) return std::nullopt;
-  const bool motion = IsMotion(request);
-  return Await(seq, welcome_.lockstep ? options_.lockstep_timeout_s : motion ? options_.motion_timeout_s : 10.0);
+  return Await(welcome_.lockstep ? options_.lockstep_timeout_s : timeout_s);
 }
 
 Reply RemoteRobot::Exchange(const Request& request) {
@@ -257,7 +303,7 @@ Reply RemoteRobot::Exchange(const Request& request) {
 }
 
 void RemoteRobot::RequireState(const Reply& reply) {
-  if (!std::holds_alternative<StateReply>(reply)) Lose("answers with something else than its state");
+  if (!std::holds_alternative<StateReply>(reply)) Lose("answers with something else than its state", true);
 }
 
 void RemoteRobot::ZeroWrench() {
@@ -265,8 +311,22 @@ void RemoteRobot::ZeroWrench() {
   if (reply) RequireState(*reply);
 }
 
-void RemoteRobot::Start() { RequireState(Exchange(StartRequest{})); }
-void RemoteRobot::Recover() { RequireState(Exchange(RecoverRequest{})); }
+void RemoteRobot::RequireReady(const char* after) const {
+  const RobotMode mode = State().mode;
+  if (mode == RobotMode::kReady || mode == RobotMode::kMoving) return;
+  throw WorldError("robot", fmt::format("says after {} that it is in mode '{}'", after, ToString(mode)),
+                   "see what its program and its controller say");
+}
+
+void RemoteRobot::Start() {
+  RequireState(Exchange(StartRequest{}));
+  if (lost().empty()) RequireReady("start");
+}
+
+void RemoteRobot::Recover() {
+  RequireState(Exchange(RecoverRequest{}));
+  if (lost().empty() && State().mode != RobotMode::kWaiting) RequireReady("recover");
+}
 
 void RemoteRobot::Bye() {
   std::uint64_t seq = 0;
@@ -287,69 +347,113 @@ VerdictReply RemoteRobot::Verdict() {
   return *verdict;
 }
 
-MotionResult RemoteRobot::Move(const Request& request, double longest_m) {
-  if (options_.cancellation != nullptr && options_.cancellation->cancelled()) {
-    MotionResult result;
-    result.reason = StopReason::kAborted;
-    result.detail = "stopped by order";
-    result.world_T_tool = ToolPose();
-    return result;
+MotionResult RemoteRobot::NotSent(StopReason reason, const std::string& detail) const {
+  MotionResult result;
+  result.reason = reason;
+  result.detail = detail;
+  result.world_T_tool = ToolPose();
+  return result;
+}
+
+std::string RemoteRobot::FaultOf(const ResultReply& ended, const Pose& before, const Way& way) const {
+  const MotionResult& result = ended.result;
+  const Pose& end = result.world_T_tool;
+  const Eigen::Vector3d moved = end.translation() - before.translation();
+  if (moved.norm() > way.longest_m + kJump_m) {
+    return fmt::format("the reported pose jumps: {:.0f} mm in a motion of {:.0f} mm", 1e3 * moved.norm(),
+                       1e3 * way.longest_m);
   }
-  const Pose before = ToolPose();
+  if ((ended.state.world_T_tool.translation() - end.translation()).norm() > kJump_m) {
+    return "the reported pose jumps at the end of a motion";
+  }
+  if (std::abs(result.travelled_m) > way.longest_m + kJump_m) {
+    return fmt::format("travelled {:.0f} mm in a motion of {:.0f} mm", 1e3 * result.travelled_m, 1e3 * way.longest_m);
+  }
+  if (AngleBetween(before, end) > way.turn_rad + kTurn_rad) return "the tool has turned in a motion that does not turn";
+  if (way.direction && way.direction->dot(moved) < -kReached_m) return "the motion has led the other way";
+  if (result.reason != StopReason::kReached || !way.end) return "";
+  const double missed_m = (way.end->translation() - end.translation()).norm();
+  if (missed_m > kReached_m) return fmt::format("'reached' is {:.0f} mm from the end of the motion", 1e3 * missed_m);
+  return AngleBetween(*way.end, end) > kTurn_rad ? "'reached' is turned against the end of the motion" : "";
+}
+
+MotionResult RemoteRobot::Move(const Request& request, const Way& way) {
+  if (options_.cancellation != nullptr && options_.cancellation->cancelled()) {
+    return NotSent(StopReason::kAborted, "stopped by order");
+  }
+  const RobotState begun = State();
+  if (begun.mode == RobotMode::kFault || begun.mode == RobotMode::kProtectiveStop) {
+    return NotSent(StopReason::kAborted, begun.mode == RobotMode::kFault ? "the robot is out of order"
+                                                                         : "protective stop: not recovered from");
+  }
   {
     const std::lock_guard lock(mutex_);
     moving_ = true;
   }
-  const std::optional<Reply> reply = TryExchange(request);
-  const std::lock_guard lock(mutex_);
-  moving_ = false;
-  const auto lost_here = [&](const std::string& reason) {
-    if (lost_.empty()) lost_ = reason;
-    connection_.Shutdown();
-    MotionResult result;
-    result.reason = StopReason::kAborted;
-    result.detail = "link lost: " + lost_;
-    result.world_T_tool = state_.world_T_tool;
-    return result;
-  };
-  if (!reply) return lost_here("no reply");
-  if (const auto* error = std::get_if<ErrorReply>(&*reply)) {
-    MotionResult result;
-    result.reason = StopReason::kUnplanned;
-    result.detail = "refused by the robot: " + error->text;
-    result.world_T_tool = state_.world_T_tool;
-    return result;
+  const std::optional<Reply> reply = TryExchange(request, way.timeout_s);
+  {
+    const std::lock_guard lock(mutex_);
+    moving_ = false;
   }
-  const auto* ended = std::get_if<ResultReply>(&*reply);
-  if (ended == nullptr) return lost_here("answers a motion with something else");
-  const double moved_m = (ended->result.world_T_tool.translation() - before.translation()).norm();
-  if (moved_m > longest_m + kJump_m) {
-    return lost_here(
-        fmt::format("the reported pose jumps: {:.0f} mm in a motion of {:.0f} mm", 1e3 * moved_m, 1e3 * longest_m));
+  const auto* error = reply ? std::get_if<ErrorReply>(&*reply) : nullptr;
+  if (error != nullptr) return NotSent(StopReason::kUnplanned, "refused by the robot: " + error->text);
+  const auto* ended = reply ? std::get_if<ResultReply>(&*reply) : nullptr;
+  if (!reply) {
+    Lose("no reply");
+  } else if (ended == nullptr) {
+    Lose("answers a motion with something else", true);
+  } else if (const std::string fault = FaultOf(*ended, begun.world_T_tool, way); !fault.empty()) {
+    Lose(fault, true);
+  } else {
+    return ended->result;
   }
-  const double settled_m = (ended->state.world_T_tool.translation() - ended->result.world_T_tool.translation()).norm();
-  if (settled_m > kJump_m) return lost_here("the reported pose jumps at the end of a motion");
-  return ended->result;
+  return NotSent(StopReason::kAborted, "link lost: " + lost());
 }
 
-MotionResult RemoteRobot::Transfer(const Pose& world_T_tool) { return Move(TransferRequest{world_T_tool}, kAnyLength); }
+MotionResult RemoteRobot::Transfer(const Pose& world_T_tool) {
+  Way way;
+  way.longest_m = kAnyLength;
+  way.turn_rad = kAnyLength;
+  way.end = world_T_tool;
+  way.timeout_s = options_.transfer_timeout_s;
+  return Move(TransferRequest{world_T_tool}, way);
+}
 
 MotionResult RemoteRobot::LinearMove(const Pose& world_T_tool, double speed_m_s, double contact_force_n) {
-  const double length_m = (world_T_tool.translation() - ToolPose().translation()).norm();
-  return Move(LinearRequest{world_T_tool, speed_m_s, contact_force_n}, length_m);
+  const Pose here = ToolPose();
+  Way way;
+  way.longest_m = (world_T_tool.translation() - here.translation()).norm();
+  way.turn_rad = AngleBetween(here, world_T_tool);
+  way.end = world_T_tool;
+  way.timeout_s = kSlowness * way.longest_m / speed_m_s + kSpare_s;
+  return Move(LinearRequest{world_T_tool, speed_m_s, contact_force_n}, way);
 }
 
-MotionResult RemoteRobot::Guarded(const GuardedMotion& motion) { return Move(motion, motion.distance_m); }
+MotionResult RemoteRobot::Guarded(const GuardedMotion& motion) {
+  Way way;
+  way.longest_m = motion.distance_m;
+  way.end = ToolPose();
+  way.end->translation() += motion.distance_m * motion.direction;
+  way.direction = motion.direction;
+  way.timeout_s = kSlowness * motion.distance_m / motion.speed_m_s + kSpare_s;
+  return Move(motion, way);
+}
 
 MotionResult RemoteRobot::Compliant(const CompliantMotion& motion) {
-  const auto length_m = [&](const CompliantMotion& part) {
-    double farthest_m = 0.0;
-    const Eigen::Vector3d here = ToolPose().translation();
-    for (const Pose& pose : part.world_T_tool) farthest_m = std::max(farthest_m, (pose.translation() - here).norm());
-    return farthest_m;
+  const auto way_of = [&](const CompliantMotion& part) {
+    Way way;
+    const Pose here = ToolPose();
+    Eigen::Vector3d before = here.translation();
+    for (const Pose& pose : part.world_T_tool) {
+      way.longest_m += (pose.translation() - before).norm();
+      way.turn_rad = std::max(way.turn_rad, AngleBetween(here, pose));
+      before = pose.translation();
+    }
+    way.timeout_s = kSlowness * part.time_limit_s + kSpare_s;
+    return way;
   };
   if (options_.form == WireForm::kJson || motion.world_T_tool.size() <= kMostWayPointsInNumbers) {
-    return Move(motion, length_m(motion));
+    return Move(motion, way_of(motion));
   }
   // The numbers-only form knows few way points: one piece after the other, at rest in between.
   MotionResult whole;
@@ -360,7 +464,7 @@ MotionResult RemoteRobot::Compliant(const CompliantMotion& motion) {
     const std::size_t count = std::min(kMostWayPointsInNumbers, motion.world_T_tool.size() - i);
     piece.world_T_tool.assign(from, from + static_cast<std::ptrdiff_t>(count));
     piece.time_limit_s = std::max(0.01, motion.time_limit_s - (Time() - began_s));
-    MotionResult result = Move(piece, length_m(piece));
+    MotionResult result = Move(piece, way_of(piece));
     result.travelled_m += whole.travelled_m;
     result.peak_force_n = std::max(result.peak_force_n, whole.peak_force_n);
     whole = result;
@@ -372,15 +476,24 @@ MotionResult RemoteRobot::Compliant(const CompliantMotion& motion) {
 ContactResponse RemoteRobot::Contact(const Eigen::Vector3d& direction) const {
   // Asking goes over the link, and changes nothing of the robot.
   const std::optional<Reply> reply = const_cast<RemoteRobot*>(this)->TryExchange(ContactRequest{direction});
-  const auto* told = reply ? std::get_if<ContactReply>(&*reply) : nullptr;
-  if (told == nullptr) return Robot::Contact(direction);
-  ContactResponse contact;
-  contact.held_mass_kg = told->held_mass_kg;
-  contact.free_mass_kg = told->free_mass_kg;
-  contact.stiffness_n_m = told->stiffness_n_m;
-  contact.damping_ratio = told->damping_ratio;
-  contact.reaction_time_s = told->reaction_time_s;
-  contact.force_noise_n = told->force_noise_n;
+  ContactResponse contact = Robot::Contact(direction);
+  if (const auto* told = reply ? std::get_if<ContactReply>(&*reply) : nullptr) {
+    contact.held_mass_kg = told->held_mass_kg;
+    contact.free_mass_kg = told->free_mass_kg;
+    contact.stiffness_n_m = told->stiffness_n_m;
+    contact.damping_ratio = told->damping_ratio;
+    contact.reaction_time_s = told->reaction_time_s;
+    contact.force_noise_n = told->force_noise_n;
+  } else {
+    const Capabilities& stated = welcome_.capabilities;
+    contact.held_mass_kg = contact.free_mass_kg = stated.effective_mass_kg;
+    contact.reaction_time_s = stated.reaction_time_s;
+    contact.force_noise_n = stated.force_noise_n;
+  }
+  const MeasuredContact& measured = options_.measured;
+  contact.stiffness_n_m = measured.stiffness_n_m.value_or(contact.stiffness_n_m);
+  contact.reaction_time_s = measured.reaction_time_s.value_or(contact.reaction_time_s);
+  contact.force_noise_n = measured.force_noise_n.value_or(contact.force_noise_n);
   return contact;
 }
 
@@ -389,7 +502,11 @@ MotionResult RemoteRobot::FollowTwist(const TwistMotion& motion) {
   if (std::find(known.begin(), known.end(), "twist") == known.end()) return Robot::FollowTwist(motion);
   const double lever_m = motion.tool_T_frame.translation().norm();
   const double speed_m_s = motion.linear_m_s.norm() + lever_m * motion.angular_rad_s.norm();
-  return Move(motion, motion.duration_s * std::max(speed_m_s, 1.0));
+  Way way;
+  way.longest_m = motion.duration_s * std::max(speed_m_s, 1.0);
+  way.turn_rad = motion.duration_s * std::max(motion.angular_rad_s.norm(), 1.0);
+  way.timeout_s = kSlowness * motion.duration_s + kSpare_s;
+  return Move(motion, way);
 }
 
 CameraView RemoteRobot::Look() {

@@ -30,8 +30,9 @@ class PolicySink {
 
 /// What a family is budgeted by.
 struct FamilyTraits {
-  bool openings = false;      ///< the opening of the target is open while localizing
-  bool orientations = false;  ///< the orientation of the target is uncertain
+  bool openings = false;        ///< the opening of the target is open while localizing
+  bool orientations = false;    ///< the orientation of the target is uncertain
+  bool cells_per_axis = false;  ///< a cell does not cost the same along all axes
 };
 
 /// Problems of uncertain orientations up to this size are worth more expansions than larger ones.
@@ -41,7 +42,8 @@ inline constexpr int kSmallOrientedHypotheses = 600;
 /// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
 /// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 60,000 above, where many stay open. 500
 /// where the map has openings: the first policy and the bound at the start are all there, and the search between them
-/// adds nothing. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
+/// adds nothing. 3000 where cells cost by their axis: bounds are weaker there, and no policy of the plug's family came
+/// of later expansions. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
 SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
                                std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
 

@@ -164,6 +164,7 @@ TEST(Executor, SameAnswersSameRecord) {
 }
 
 // Only relative poses matter: the whole world turned and moved gives the same motions.
+
 TEST(Executor, MovedWorldSameMotions) {
   const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), HousingMap(), {4, 4, 4});
   const auto graph = PolicyFor(problem);
@@ -239,9 +240,10 @@ TEST(Executor, AdversarialRobotsEndWithAReason) {
       robot.follow_ = follow;
       const ExecutionRecord record = RunStubborn(robot);
       EXPECT_FALSE(record.reason.empty());
-      if (!follow || contact) {
-        EXPECT_FALSE(record.believed_inserted) << Trace(record);
-      }
+      EXPECT_FALSE(record.believed_inserted) << Trace(record);
+      if (contact) continue;
+      EXPECT_FALSE(record.believed_localized) << "nothing was ever touched";
+      if (follow) EXPECT_EQ(record.reason, "no contact was met: is the target there?");
     }
   }
   StubbornRobot aborted(StubbornStart(), false, StopReason::kAborted);

@@ -21,7 +21,9 @@ namespace feeler::workflow {
 namespace {
 
 planner::FamilyTraits TraitsOf(const PlanningSetup& setup) {
-  return {.openings = setup.opening == env::Opening::kOpen, .orientations = LatticeOrientations(setup.task()) > 1};
+  return {.openings = setup.opening == env::Opening::kOpen,
+          .orientations = LatticeOrientations(setup.task()) > 1,
+          .cells_per_axis = !setup.task().cost.one_per_cell()};
 }
 
 /// Null where there is no limit: JSON has no infinity.

@@ -221,6 +221,9 @@ Capabilities CapabilitiesOf(const json& item) {
   return c;
 }
 
+/// What the other end wrote, fit to be shown.
+std::string TextOf(const json& item) { return Printable(item.get<std::string>(), kMostText); }
+
 std::vector<int> ExtentsOf(const json& item) {
   auto extents = item.get<std::vector<int>>();
   if (extents.size() == 4) RefuseMessage("extents are three numbers, or five");
@@ -293,7 +296,7 @@ MotionResult ResultOf(const json& item) {
   result.contact = item["contact"].get<bool>();
   result.peak_force_n = item["peak_force_n"].get<double>();
   result.world_T_tool = PoseOf(item["pose"]);
-  result.detail = item["detail"].get<std::string>();
+  result.detail = TextOf(item["detail"]);
   return result;
 }
 
@@ -318,15 +321,15 @@ EpisodeReply EpisodeOf(const json& item) {
   EpisodeReply m;
   m.seed = item["seed"].get<std::uint64_t>();
   m.episode = item["episode"].get<std::uint64_t>();
-  m.task = item["task"].get<std::string>();
-  m.noise = item["noise"].get<std::string>();
-  m.placement = item["placement"].get<std::string>();
+  m.task = TextOf(item["task"]);
+  m.noise = TextOf(item["noise"]);
+  m.placement = TextOf(item["placement"]);
   m.rejected_placements = item["rejected_placements"].get<int>();
   m.extents = ExtentsOf(item["extents"]);
   m.world_T_estimate = PoseOf(item["estimate"]);
   m.contact_threshold_n = item["contact_threshold_n"].get<double>();
   m.force_budget_n = item["force_budget_n"].get<double>();
-  m.failure = item["failure"].get<std::string>();
+  m.failure = TextOf(item["failure"]);
   m.state = StateOf(item["state"]);
   return m;
 }
@@ -344,7 +347,7 @@ VerdictReply VerdictOf(const json& item) {
   numbers("fault_values", m.fault_values);
   if (item.contains("contact_parameters")) numbers("contact_parameters", m.contact_parameters);
   m.inserted = item["inserted"].get<bool>();
-  m.reason = item["reason"].get<std::string>();
+  m.reason = TextOf(item["reason"]);
   m.depth_m = item["depth_m"].get<double>();
   m.lateral_m = item["lateral_m"].get<double>();
   m.peak_force_n = item["peak_force_n"].get<double>();
@@ -359,7 +362,7 @@ Reply ReplyOf(const std::string& type, const json& item) {
     WelcomeReply m;
     m.version = item["version"].get<int>();
     m.units = item["units"].get<std::string>();
-    m.robot = item["robot"].get<std::string>();
+    m.robot = TextOf(item["robot"]);
     m.simulated = item["simulated"].get<bool>();
     m.lockstep = item["lockstep"].get<bool>();
     m.link_timeout_s = item["link_timeout_s"].get<double>();
@@ -382,12 +385,17 @@ Reply ReplyOf(const std::string& type, const json& item) {
   if (type == "picture") return PictureReply{PictureOf(item)};
   if (type == "episode") return EpisodeOf(item);
   if (type == "verdict") return VerdictOf(item);
-  return ErrorReply{item["code"].get<std::string>(), item["text"].get<std::string>()};
+  return ErrorReply{TextOf(item["code"]), TextOf(item["text"])};
 }
 
 /// The document, if the schema takes it as "PREFIX_TYPE".
 json Checked(std::string_view line, const char* prefix, std::string& type) {
-  json document = policies::ParseJson(line, "robot message");
+  json document;
+  try {
+    document = policies::ParseJson(line, "robot message");
+  } catch (const InputError&) {
+    RefuseMessage("is not valid JSON");
+  }
   if (!document.is_object() || !document.contains("type") || !document["type"].is_string()) {
     RefuseMessage("is no object with a type");
   }

@@ -65,7 +65,7 @@ def main():
             command = [os.path.join(options.build, "feeler-execute"), "--db", options.db, "--robot",
                        f"listen:127.0.0.1:{execute_port}", "--wire", "numbers", "--estimate",
                        estimate_text(told["estimate"]), "--extents", options.extents, "--start", "--json",
-                       "--heartbeat", "0.004"]
+                       "--heartbeat", "0.004", "--link-timeout", f"{options.link_timeout:g}"]
             if options.out:
                 command += ["--out", f"{options.out}.{number}"]
             execute = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -84,7 +84,7 @@ def main():
             out, err = execute.communicate(timeout=60)
             arm.hold()
             verdict = arm.verdict()
-            summary = json.loads(out) if execute.returncode == 0 else {"failures": {err.strip(): 1}}
+            summary = json.loads(out) if out.strip() else {"failures": {err.strip(): 1}}
             results.append({"episode": number, "inserted": verdict["inserted"],
                             "believed": summary.get("believed_inserted", 0) == 1, "peak_force_n": verdict["peak_force_n"],
                             "forbidden_contacts": verdict["forbidden_contacts"],
