@@ -243,7 +243,7 @@ TEST(Executor, AdversarialRobotsEndWithAReason) {
       EXPECT_FALSE(record.believed_inserted) << Trace(record);
       if (contact) continue;
       EXPECT_FALSE(record.believed_localized) << "nothing was ever touched";
-      if (follow) EXPECT_EQ(record.reason, "no contact was met: is the target there?");
+      EXPECT_EQ(record.reason == "no contact was met: is the target there?", follow) << record.reason;
     }
   }
   StubbornRobot aborted(StubbornStart(), false, StopReason::kAborted);
