@@ -295,6 +295,7 @@ std::optional<Reply> RemoteRobot::TryExchange(const Request& request, double tim
 
 Reply RemoteRobot::Exchange(const Request& request) {
   std::optional<Reply> reply = TryExchange(request);
+  if (!reply && spoke_nonsense() && !welcome_.simulated) RefuseRobot(lost(), "see its program");
   if (!reply) throw WorldError("robot", "link lost: " + lost(), "see that it runs and that the network holds");
   if (const auto* error = std::get_if<ErrorReply>(&*reply)) {
     throw WorldError("robot", std::string(NameOf(request)) + " refused: " + error->text, "see what its program says");
