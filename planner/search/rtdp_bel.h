@@ -48,6 +48,7 @@ class RtdpBel {
         if (const auto why = stop(expansions_)) return why;
         const Backup best = Update(b);  // lines 5-7
         trial.push_back(b);
+        if (best.action < 0) break;           // a dead end, of infinite value
         b = SampleSuccessor(b, best.action);  // lines 3, 8-10
       }
       while (!trial.empty() && CheckSolved(trial.back(), stop)) trial.pop_back();
@@ -56,7 +57,7 @@ class RtdpBel {
   }
 
   bool Solved(Belief b) const { return b < nodes_.size() && nodes_[b].solved; }
-  /// The frozen action of a solved belief: an index into Model::Actions.
+  /// The frozen action of a solved belief: an index into Model::Actions, negative in a dead end (no actions).
   int Action(Belief b) const { return nodes_[b].action; }
   /// Value and lower bound times the weight of the belief.
   double Value(Belief b) { return Node(b).value; }
@@ -167,10 +168,11 @@ class RtdpBel {
       const Backup best = Evaluate(b);
       State& node = Node(b);
       closed.emplace_back(b, best.action);
-      if (!(std::abs(best.value - node.value) <= Tolerance(best.value))) {
+      if (best.value != node.value && !(std::abs(best.value - node.value) <= Tolerance(best.value))) {
         consistent = false;
         continue;
       }
+      if (best.action < 0) continue;
       ForEachShareOf(model_, model_.Actions(b)[static_cast<std::size_t>(best.action)], [&](Belief next, double) {
         State& state = Node(next);
         if (state.solved || state.visit == visit_) return;

@@ -12,7 +12,9 @@ PomdpBeliefGraph::PomdpBeliefGraph(const Pomdp& pomdp, const StateBounds& bounds
     to_goal_ = constant_ / (1.0 - pomdp.discount);
   }
   if (pomdp.discount == 1.0 && levels == 0) FindTwins();
-  Intern(pomdp.start);
+  std::vector<SparseEntry> start = pomdp.start;
+  if (!Trivial()) start_share_ = DropGoals(start);
+  Intern(std::move(start));
 }
 
 void PomdpBeliefGraph::FindTwins() {
@@ -67,6 +69,22 @@ bool PomdpBeliefGraph::IsGoal(std::span<const SparseEntry> belief) const {
   return std::ranges::all_of(belief, [&](const SparseEntry& s) { return absorbing_[s.index] != 0; });
 }
 
+double PomdpBeliefGraph::DropGoals(std::vector<SparseEntry>& belief) const {
+  if (pomdp_.discount < 1.0) return 1.0;
+  if (std::erase_if(belief, [&](const SparseEntry& s) { return absorbing_[s.index] != 0; }) == 0) return 1.0;
+  double left = 0.0;
+  for (const SparseEntry& s : belief) left += s.value;
+  for (SparseEntry& s : belief) s.value /= left;
+  return left;
+}
+
+bool PomdpBeliefGraph::Unchanged(std::span<const SparseEntry> before, std::span<const SparseEntry> after) {
+  constexpr double kRounding = 1e-9;
+  return std::ranges::equal(before, after, [](const SparseEntry& x, const SparseEntry& y) {
+    return x.index == y.index && std::abs(x.value - y.value) <= kRounding * x.value;
+  });
+}
+
 std::int64_t PomdpBeliefGraph::Level(double probability) const {
   constexpr double kRounding = 1e12;
   if (levels_ == 0) return std::llround(probability * kRounding);
@@ -118,23 +136,19 @@ double PomdpBeliefGraph::CostOf(std::span<const SparseEntry> belief, std::size_t
   return cost;
 }
 
-bool PomdpBeliefGraph::RepeatUntilChanged(std::uint32_t b, bool to_goal, Action& action) {
+void PomdpBeliefGraph::RepeatUntilChanged(std::uint32_t b, double to_goal, Action& action) {
+  double leaves = to_goal;  // summed up itself: 1 - what stays would be rounding where that is almost 1
   double stays = 0.0;
-  std::size_t kept = action.first;
   for (std::size_t i = action.first; i < successors_.size(); ++i) {
-    if (successors_[i].belief == b) {
-      stays += successors_[i].share;
-    } else {
-      successors_[kept++] = successors_[i];
-    }
+    (successors_[i].belief == b ? stays : leaves) += successors_[i].share;
   }
-  successors_.resize(kept);
-  action.count = static_cast<std::uint32_t>(kept) - action.first;
-  if (action.count == 0 && !to_goal) return false;
-  if (!(stays > 0.0)) return true;
-  action.cost /= 1.0 - stays;
-  for (std::size_t i = action.first; i < kept; ++i) successors_[i].share /= 1.0 - stays;
-  return true;
+  if (stays == 0.0 || leaves == 0.0) return;
+  const auto first = successors_.begin() + static_cast<std::ptrdiff_t>(action.first);
+  successors_.erase(std::remove_if(first, successors_.end(), [&](const Successor& s) { return s.belief == b; }),
+                    successors_.end());
+  action.count = static_cast<std::uint32_t>(successors_.size()) - action.first;
+  action.cost /= leaves;
+  for (std::size_t i = action.first; i < successors_.size(); ++i) successors_[i].share /= leaves;
 }
 
 void PomdpBeliefGraph::Expand(std::uint32_t b) {
@@ -143,26 +157,31 @@ void PomdpBeliefGraph::Expand(std::uint32_t b) {
   BeliefUpdate update(pomdp_);
   for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
     Action action{CostOf(belief, a), a, static_cast<std::uint32_t>(successors_.size()), 0};
-    bool moves = false;
-    bool to_goal = false;
+    bool changes = false;
+    double to_goal = 0.0;
     update(belief, a, [&](std::uint32_t o, double probability, const std::vector<SparseEntry>& next) {
       const double share = probability * pomdp_.discount;
       if (IsGoal(next)) {
         action.cost += share * to_goal_;
-        moves = to_goal = true;
+        to_goal += share;
         return;
       }
-      const std::uint32_t successor = Intern(next);
-      moves = moves || successor != b;
-      successors_.push_back({successor, o, share});
+      std::vector<SparseEntry> open = next;
+      const double left = DropGoals(open);
+      for (const SparseEntry& s : left < 1.0 ? std::span(next) : std::span<const SparseEntry>()) {
+        if (absorbing_[s.index] != 0) to_goal += share * s.value;
+      }
+      const std::uint32_t successor = Intern(open);
+      changes = changes || successor != b || (levels_ == 0 && action.cost > 0.0 && !Unchanged(belief, Merged(open)));
+      successors_.push_back({successor, o, share * left});
       ++action.count;
     });
     // Without discount an action that changes nothing leads nowhere: no policy needs it.
-    if (!moves && pomdp_.discount == 1.0) {
+    if (!changes && to_goal == 0.0 && pomdp_.discount == 1.0) {
       successors_.resize(action.first);
       continue;
     }
-    if (!twin_.empty() && !RepeatUntilChanged(b, to_goal, action)) continue;
+    if (!twin_.empty()) RepeatUntilChanged(b, to_goal, action);
     actions_.push_back(action);
     bytes_ += sizeof(Action) + action.count * sizeof(Successor);
   }

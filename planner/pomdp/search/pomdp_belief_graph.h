@@ -25,6 +25,10 @@ namespace feeler::planner {
 /// what a search proves here holds for the POMDP. `levels` = D > 0: RTDP-Bel's discretisation, d(b)(s) = ceil(D b(s));
 /// the first belief met stands for all that share its d(b), and nothing is proven.
 ///
+/// Without discount goals drop out of beliefs, which are then normalised over what is left: whatever is done, a goal
+/// costs nothing, so V*(b) = P(no goal yet) V*(b given that) whether a goal shows or not. Shares carry that
+/// probability.
+///
 /// Without discount an action may cost nothing and leave a belief as it is for a while, and lower bounds do not rise
 /// along a way that costs nothing and comes back. So, with exact beliefs, states of the same future are one (the
 /// reading that led to a state is no part of what follows), and an action that leaves the belief as it is with
@@ -49,6 +53,8 @@ class PomdpBeliefGraph {
   std::uint32_t Start() const { return 0; }
   /// True if the initial belief lies within absorbing states.
   bool Trivial() const { return IsGoal(pomdp_.start); }
+  /// What of the initial belief Start() stands for: its value is this times that of Start().
+  double start_share() const { return start_share_; }
   std::size_t size() const { return beliefs_.size(); }
   double Weight(std::uint32_t /*b*/) const { return 1.0; }
   double Heuristic(std::uint32_t b) const { return beliefs_[b].heuristic; }
@@ -70,6 +76,8 @@ class PomdpBeliefGraph {
   const Pomdp& pomdp() const { return pomdp_; }
   std::span<const SparseEntry> Belief(std::uint32_t b) const { return beliefs_[b].states; }
   bool IsGoal(std::span<const SparseEntry> belief) const;
+  /// Without discount: takes goals out of a belief that is none; returns the probability of what is left.
+  double DropGoals(std::vector<SparseEntry>& belief) const;
   /// Lower bound of the cost of a belief: from the fast informed bound.
   double HeuristicOf(std::span<const SparseEntry> belief) const { return to_goal_ - BestRow(bounds_.informed, belief); }
   /// The number of a belief; kNone if it has not been met.
@@ -95,8 +103,10 @@ class PomdpBeliefGraph {
   /// The belief over those first states.
   std::vector<SparseEntry> Merged(std::span<const SparseEntry> belief) const;
   std::uint32_t FindMerged(std::span<const SparseEntry> belief) const;
-  /// Takes the belief itself out of the successors of its last action. False: nothing else follows, nor a goal.
-  bool RepeatUntilChanged(std::uint32_t b, bool to_goal, Action& action);
+  /// Takes the belief itself out of the successors of its last action, which reaches goals with probability `to_goal`.
+  void RepeatUntilChanged(std::uint32_t b, double to_goal, Action& action);
+  /// True if an outcome is the belief before, not only up to the rounding of keys.
+  static bool Unchanged(std::span<const SparseEntry> before, std::span<const SparseEntry> after);
   std::int64_t Level(double probability) const;
   std::uint64_t HashOf(std::span<const SparseEntry> belief) const;
   bool Same(std::span<const SparseEntry> a, std::span<const SparseEntry> b) const;
@@ -109,6 +119,7 @@ class PomdpBeliefGraph {
   std::vector<std::uint32_t> twin_;  ///< empty: each its own
   double constant_ = 0.0;            ///< C
   double to_goal_ = 0.0;             ///< C / (1 - discount); 0 with a discount of 1
+  double start_share_ = 1.0;
   std::vector<Node> beliefs_;
   std::vector<Action> actions_;
   std::vector<Successor> successors_;

@@ -224,8 +224,10 @@ class Attempt {
     const auto account = [&](std::int64_t expansions) {
       result_.trials = search.trials();
       result_.expansions = expansions;
-      result_.value_lower = std::max(result_.value_lower, graph.to_goal() - search.Upper(graph.Start()));
-      result_.value_upper = std::min(result_.value_upper, graph.to_goal() - search.Lower(graph.Start()));
+      result_.value_lower =
+          std::max(result_.value_lower, graph.to_goal() - graph.start_share() * search.Upper(graph.Start()));
+      result_.value_upper =
+          std::min(result_.value_upper, graph.to_goal() - graph.start_share() * search.Lower(graph.Start()));
     };
     const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       account(expansions);
@@ -281,7 +283,7 @@ class Attempt {
   template <class Search>
   static int Greedy(PomdpBeliefGraph& graph, Search& search, std::uint32_t b) {
     if (search.Solved(b)) return search.Action(b);
-    int best = 0;
+    int best = -1;
     double least = kUnbounded;
     int index = 0;
     for (const PomdpBeliefGraph::Action& action : graph.Actions(b)) {
@@ -308,9 +310,11 @@ class Attempt {
           cost += share * graph.to_goal();
           return;
         }
-        const std::uint32_t known = graph.Find(next);
-        cost += share *
-                (known == PomdpBeliefGraph::kNone ? options_.epsilon * graph.HeuristicOf(next) : search.Value(known));
+        std::vector<SparseEntry> open = next;
+        const double left = graph.DropGoals(open);
+        const std::uint32_t known = graph.Find(open);
+        cost += share * left *
+                (known == PomdpBeliefGraph::kNone ? options_.epsilon * graph.HeuristicOf(open) : search.Value(known));
       });
       if (cost < least) least = cost, best = a;
     }

@@ -6,7 +6,8 @@
 // - bounds of states: blind <= V* <= informed <= QMDP;
 // - RTDP-Bel without discretisation solves what is small; with it its controller is worth no more than U;
 // - E-RTDP-Bel without experience is RTDP-Bel, and with a policy of the problem itself no worse;
-// - goal POMDPs cost what they must; those without a way to a goal are refused; same seed, same result.
+// - goal POMDPs cost what they must, whether the goal shows or not; those without a way to a goal are refused, and
+//   where none is for certain nothing is made up; same seed, same result.
 #include "feeler/planner/pomdp/search/solve_pomdp.h"
 
 #include <gtest/gtest.h>
@@ -179,6 +180,52 @@ TEST(SolvePomdp, GoalProblems) {
   ASSERT_TRUE(result.controller);
   EXPECT_NEAR(EvaluateController(pomdp, *result.controller)->value, -least, 1e-3);
   EXPECT_THROW(Solve(pomdp, PomdpSolverKind::kPointBased), InputError);
+}
+
+/// One action of cost 1 that reaches the goal with probability p; `sensor` are the rows of s and g over o and p.
+Pomdp Knocking(double p, const std::string& sensor) {
+  const std::string chance = std::to_string(p);
+  return ParseCassandraPomdp(
+      "discount: 1\nvalues: cost\nstates: s g\nactions: a\nobservations: o p\nstart: s\nT: a : s : g " + chance +
+          "\nT: a : s : s " + std::to_string(1.0 - p) + "\nT: a : g : g 1\nO: a\n" + sensor + "\nR: a : s : * : * 1\n",
+      "knocking");
+}
+
+TEST(SolvePomdp, GoalsNeedNotShow) {
+  for (const std::string sensor : {"1 0 1 0", "0.9 0.1 0.1 0.9", "1 0 0 1"}) {
+    for (const double p : {0.5, 0.001}) {
+      for (const PomdpSolverKind kind : {PomdpSolverKind::kCertified, PomdpSolverKind::kRtdpBel}) {
+        const PomdpResult result = Solve(Knocking(p, sensor), kind);
+        EXPECT_EQ(result.status, SolverStatus::kConverged);
+        EXPECT_NEAR(result.value_lower, -1.0 / p, 1e-6 / p) << sensor << p << ToString(kind);
+        EXPECT_GE(result.value_upper, -1.0 / p - 1e-9) << sensor << p << ToString(kind);
+        ASSERT_TRUE(result.controller);
+      }
+    }
+  }
+  // Half of the initial belief is at the goal already.
+  Pomdp half = Knocking(0.5, "1 0 1 0");
+  half.start = {{0, 0.5}, {1, 0.5}};
+  EXPECT_NEAR(Solve(half, PomdpSolverKind::kCertified).value_lower, -1.0, 1e-9);
+  EXPECT_NEAR(Solve(half, PomdpSolverKind::kCertified).value_upper, -1.0, 1e-9);
+}
+
+TEST(SolvePomdp, DeadEndsOfBeliefs) {
+  // Each door is right for one state, and nothing tells the states apart.
+  const Pomdp pomdp = ParseCassandraPomdp(
+      "discount: 1\nvalues: cost\nstates: s t trap g\nactions: a b\nobservations: o\nstart: 0.5 0.5 0 0\n"
+      "T: a : s : g 1\nT: a : t : trap 1\nT: b : s : trap 1\nT: b : t : g 1\nT: * : trap : trap 1\nT: * : g : g 1\n"
+      "O: * uniform\nR: * : s : * : * 1\nR: * : t : * : * 1\nR: * : trap : * : * 1\n",
+      "doors");
+  for (const int levels : {0, 15}) {
+    PomdpSolverOptions options;
+    options.kind = PomdpSolverKind::kRtdpBel;
+    options.levels = levels;
+    options.time_limit_s = 5.0;
+    const PomdpResult result = SolvePomdp(pomdp, options);
+    EXPECT_EQ(result.status, SolverStatus::kConverged);
+    EXPECT_FALSE(result.controller);
+  }
 }
 
 TEST(SolvePomdp, NoWayToAGoalIsSaid) {
