@@ -4,15 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
+#include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/pomdp/model/goal_costs.h"
 
 namespace feeler::planner {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPrecision = 1e-12;
 constexpr int kSweeps = 100000;
 
@@ -51,21 +51,6 @@ struct System {
       rows.Append(row);
     }
   }
-
-  /// Without discount a value is finite only where every pair can still come to a goal.
-  bool Proper() const {
-    std::vector<std::uint8_t> ends = final;
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (std::size_t i = ends.size(); i-- > 0;) {
-        if (ends[i] != 0) continue;
-        const auto row = rows.Row(i);
-        if (std::ranges::any_of(row, [&](const SparseEntry& next) { return ends[next.index] != 0; }))
-          ends[i] = 1, changed = true;
-      }
-    }
-    return std::ranges::all_of(ends, [](std::uint8_t e) { return e != 0; });
-  }
 };
 
 }  // namespace
@@ -78,14 +63,17 @@ std::uint32_t PomdpController::Next(std::uint32_t node, std::uint32_t observatio
 
 std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
                                                   const std::function<bool()>& stop) {
-  const System system(pomdp, controller);
+  System system(pomdp, controller);
   ControllerValue result;
   result.unknowns = system.reward.size();
-  if (pomdp.discount == 1.0 && !system.Proper()) {
-    result.value = -kInfinity;
+  std::vector<double> values(result.unknowns, 0.0);
+  if (pomdp.discount == 1.0) {
+    for (double& reward : system.reward) reward = std::max(0.0, -reward);
+    const auto costs = GoalCosts({std::move(system.rows), std::move(system.reward), std::move(system.final)}, stop);
+    if (!costs) return std::nullopt;
+    for (const SparseEntry& s : system.start) result.value -= s.value * (*costs)[s.index];
     return result;
   }
-  std::vector<double> values(result.unknowns, 0.0);
   double scale = 1.0;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     result.residual = 0.0;
@@ -97,12 +85,11 @@ std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const Pomd
       values[i] = value;
       scale = std::max(scale, std::abs(value));
     }
-    if (result.residual <= kPrecision * scale) break;
-    if (stop && stop()) return std::nullopt;
+    if (result.residual <= kPrecision * scale || (stop && stop())) break;
   }
   for (const SparseEntry& s : system.start) result.value += s.value * values[s.index];
-  // |V - V^| <= residual / (1 - discount) in discounted systems.
-  if (pomdp.discount < 1.0) result.value -= result.residual * pomdp.discount / (1.0 - pomdp.discount);
+  // |V - V^| <= residual / (1 - discount), wherever the sweeps end.
+  result.value -= result.residual * pomdp.discount / (1.0 - pomdp.discount);
   return result;
 }
 

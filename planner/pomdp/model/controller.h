@@ -28,13 +28,16 @@ struct PomdpController {
 };
 
 struct ControllerValue {
-  double value = 0.0;  ///< expected reward from the initial belief; -infinity where a goal is not reached for certain
+  /// Expected reward from the initial belief, or below it by what the residual may amount to; -infinity where a goal is
+  /// not reached for certain.
+  double value = 0.0;
   std::size_t unknowns = 0;  ///< pairs of node and state
-  double residual = 0.0;     ///< of the linear system, at most; `value` is lowered by what it may amount to
+  double residual = 0.0;     ///< of the linear system with a discount below 1, at most
 };
 
 /// Exact evaluation by the linear system V(n, s) = R(a_n, s) + discount sum P(s', o | s, a_n) V(next(n, o), s'), over
-/// the pairs that can be met, by Gauss-Seidel sweeps. `stop` may cut the sweeps short: then there is no value.
+/// the pairs that can be met, by Gauss-Seidel sweeps. `stop` may cut them short: then `value` is the lower; without
+/// discount (GoalCosts) there is none.
 std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
                                                   const std::function<bool()>& stop = {});
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "feeler/planner/pomdp/model/goal_costs.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -39,6 +41,8 @@ class Sweeper {
       for (std::size_t a = 0; a < actions; ++a) {
         Repeat([&] { return SweepBlind(a, bounds.blind[a]); });
       }
+    } else {
+      for (std::size_t a = 0; a < actions; ++a) BlindToGoal(a, bounds.blind[a]);
     }
     return bounds;
   }
@@ -109,6 +113,17 @@ class Sweeper {
       values[s] = value;
     }
     return change;
+  }
+
+  void BlindToGoal(std::size_t a, std::vector<double>& values) const {
+    GoalChain chain;
+    chain.goal = AbsorbingStates(pomdp_);
+    for (std::size_t s = 0; s < values.size(); ++s) {
+      chain.rows.Append(pomdp_.transitions.Row(pomdp_.At(a, s)));
+      chain.cost.push_back(std::max(0.0, -pomdp_.reward[pomdp_.At(a, s)]));
+    }
+    const auto costs = GoalCosts(chain, options_.stop);
+    for (std::size_t s = 0; costs && s < values.size(); ++s) values[s] = -(*costs)[s];
   }
 
   const Pomdp& pomdp_;

@@ -30,8 +30,13 @@ constexpr std::size_t kExperienceBeliefs = 50'000;
 class BlindIncumbent {
  public:
   BlindIncumbent(const PomdpBeliefGraph& graph, const StateBounds& bounds) : graph_(graph), bounds_(bounds) {}
-  bool Solved(std::uint32_t /*b*/) const { return graph_.pomdp().discount < 1.0; }
-  double Value(std::uint32_t b) const { return graph_.to_goal() - BestRow(bounds_.blind, graph_.Belief(b)); }
+  /// False where none of them reaches a goal for certain.
+  bool Solved(std::uint32_t b) { return Value(b) < kUnbounded; }
+  double Value(std::uint32_t b) {
+    if (b >= values_.size()) values_.resize(std::max<std::size_t>(graph_.size(), b + std::size_t{1}), kUnknown);
+    if (values_[b] == kUnknown) values_[b] = graph_.to_goal() - BestRow(bounds_.blind, graph_.Belief(b));
+    return values_[b];
+  }
   int Action(std::uint32_t b) const {
     int best = 0;
     double most = -kUnbounded;
@@ -45,8 +50,10 @@ class BlindIncumbent {
   std::int64_t expansions() const { return 0; }
 
  private:
+  static constexpr double kUnknown = -kUnbounded;
   const PomdpBeliefGraph& graph_;
   const StateBounds& bounds_;
+  std::vector<double> values_;
 };
 
 class Attempt {
@@ -65,6 +72,7 @@ class Attempt {
     bounds_ = ComputeStateBounds(pomdp_, {.stop = [this] { return Stop(0).has_value(); }});
     result_.value_upper = BestRow(bounds_.informed, pomdp_.start);
     result_.value_lower = BestRow(bounds_.blind, pomdp_.start);
+    KeepBlind();
     Row(true);
     switch (options_.kind) {
       case PomdpSolverKind::kPointBased: PointBased(); break;
@@ -72,6 +80,7 @@ class Attempt {
       case PomdpSolverKind::kRtdpBel:
       case PomdpSolverKind::kERtdpBel: Rtdp(); break;
     }
+    if (result_.controller) result_.value_lower = worth_;
     result_.value_upper = std::max(result_.value_upper, result_.value_lower);  // rounding
     Row(true);
     result_.wall_s = Wall();
@@ -155,29 +164,45 @@ class Attempt {
       }
       result_.alphas.push_back(std::move(full));
     }
-    result_.controller = plan.controller;
+    Keep(plan.controller, result_.value_lower);
     const PointBasedPlan relinked = search.Plan(true);
     if (relinked.controller.nodes.size() * relinked.largest_class <= kEvaluatedUnknowns) Offer(relinked.controller);
   }
 
-  /// Takes a controller if it is worth more than what is proven.
+  void Keep(const PomdpController& controller, double worth) {
+    result_.controller = controller;
+    worth_ = worth;
+  }
+
+  /// The best of the policies that always do the same.
+  void KeepBlind() {
+    if (result_.value_lower == -kUnbounded) return;
+    std::uint32_t best = 0;
+    double most = -kUnbounded;
+    for (std::uint32_t a = 0; a < bounds_.blind.size(); ++a) {
+      const double value = BestRow({bounds_.blind[a]}, pomdp_.start);
+      if (value > most) most = value, best = a;
+    }
+    Keep({{{best, {}, 0}}, 0}, most);
+  }
+
+  /// Takes a controller if it is worth more than the one that is kept.
   void Offer(const PomdpController& controller) {
     const double give_up_s = GiveUp();
     const auto value = EvaluateController(pomdp_, controller, [&] { return Wall() > give_up_s; });
-    if (!value || (result_.controller && value->value <= result_.value_lower)) return;
-    result_.controller = controller;
-    result_.value_lower = std::max(result_.value_lower, value->value);
+    if (!value || value->value <= worth_) return;
+    Keep(controller, value->value);
+    result_.value_lower = std::max(result_.value_lower, worth_);
   }
 
   double GiveUp() const { return Wall() + std::max(1.0, 0.05 * Wall()); }
 
   /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
-  /// on blindly. Without discount that cannot be, nor that the policy is cut short for being too large: then there is
-  /// none.
+  /// on blindly, as it does where it is cut short for being too large. Nothing where that would not reach a goal.
   template <class ActionOf>
   std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of) {
     const double give_up_s = GiveUp();
-    const BlindIncumbent blind(graph, bounds_);
+    BlindIncumbent blind(graph, bounds_);
     PomdpController controller;
     std::map<std::uint32_t, std::uint32_t> number;
     std::vector<std::uint32_t> beliefs;
@@ -188,11 +213,11 @@ class Attempt {
     };
     of(graph.Start());
     for (std::size_t i = 0; i < beliefs.size(); ++i) {
-      const bool cut = beliefs.size() > kControllerNodes || Wall() > give_up_s;
-      const int index = cut ? -1 : action_of(beliefs[i]);
+      frozen_cut_ = beliefs.size() > kControllerNodes || Wall() > give_up_s;
+      const int index = frozen_cut_ ? -1 : action_of(beliefs[i]);
       PomdpController::Node node{0, {}, static_cast<std::uint32_t>(i)};
       if (index < 0) {
-        if (pomdp_.discount == 1.0) return std::nullopt;
+        if (!blind.Solved(beliefs[i])) return std::nullopt;
         node.action = static_cast<std::uint32_t>(blind.Action(beliefs[i]));
       } else {
         const PomdpBeliefGraph::Action action = graph.Actions(beliefs[i])[static_cast<std::size_t>(index)];
@@ -211,7 +236,7 @@ class Attempt {
   bool Trivial(const PomdpBeliefGraph& graph) {
     if (!graph.Trivial()) return false;
     result_.value_lower = result_.value_upper = 0.0;
-    result_.controller = PomdpController{{{}}, 0};
+    Keep({{{}}, 0}, 0.0);
     return true;
   }
 
@@ -231,6 +256,10 @@ class Attempt {
     };
     const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       account(expansions);
+      if (pomdp_.discount == 1.0 && search.trials() >= next_offer_) {
+        next_offer_ = 2 * search.trials();
+        OfferCyclic(graph, search, incumbent);
+      }
       Row(false);
       if (result_.value_upper - result_.value_lower <= options_.precision) return SolverStatus::kConverged;
       if (graph.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
@@ -239,8 +268,24 @@ class Attempt {
     account(search.expansions());
     result_.beliefs = graph.size();
     result_.status = why.value_or(SolverStatus::kConverged);
-    if (result_.value_lower == -kUnbounded) return;
-    result_.controller = Freeze(graph, [&](std::uint32_t b) { return search.Improved(b) ? search.Action(b) : -1; });
+    const double proven = graph.to_goal() - graph.start_share() * search.Upper(graph.Start());
+    if (proven == -kUnbounded) return;
+    const auto controller = Freeze(graph, [&](std::uint32_t b) { return search.Improved(b) ? search.Action(b) : -1; });
+    if (!controller) return;
+    // Unless it was cut short it is worth what is proven, which evaluating it may not show to the last digit.
+    if (!frozen_cut_ && proven >= worth_) Keep(*controller, proven);
+    Offer(*controller);
+  }
+
+  /// Following U never comes back to a belief, and may so never learn of a policy that must: the one that follows L is
+  /// tried now and then.
+  template <class Search>
+  void OfferCyclic(PomdpBeliefGraph& graph, Search& search, BlindIncumbent& blind) {
+    const auto controller = Freeze(graph, [&](std::uint32_t b) {
+      if (!graph.expanded(b) && blind.Solved(b)) return -1;
+      return Least(graph, b, [&](std::uint32_t next) { return search.Lower(next); });
+    });
+    if (controller) Offer(*controller);
   }
 
   void Rtdp() {
@@ -268,7 +313,10 @@ class Attempt {
     result_.expansions = search.expansions();
     result_.beliefs = graph.size();
     // The discretised model proves nothing: what its policy is worth is found by evaluating it on the POMDP itself.
-    const auto greedy = [&](std::uint32_t b) { return Greedy(graph, search, b); };
+    const auto greedy = [&](std::uint32_t b) {
+      if (search.Solved(b)) return search.Action(b);
+      return Least(graph, b, [&](std::uint32_t next) { return search.Value(next); });
+    };
     const std::optional<PomdpController> controller = Freeze(graph, greedy);
     if (controller) Offer(*controller);
     if (!result_.controller) result_.controller = controller;
@@ -280,15 +328,15 @@ class Attempt {
     }
   }
 
-  template <class Search>
-  static int Greedy(PomdpBeliefGraph& graph, Search& search, std::uint32_t b) {
-    if (search.Solved(b)) return search.Action(b);
+  /// The action of least cost; negative in a dead end.
+  template <class Value>
+  static int Least(PomdpBeliefGraph& graph, std::uint32_t b, Value value) {
     int best = -1;
     double least = kUnbounded;
     int index = 0;
     for (const PomdpBeliefGraph::Action& action : graph.Actions(b)) {
       double cost = action.cost;
-      graph.ForEachShare(action, [&](std::uint32_t next, double share) { cost += share * search.Value(next); });
+      graph.ForEachShare(action, [&](std::uint32_t next, double share) { cost += share * value(next); });
       if (cost < least) least = cost, best = index;
       ++index;
     }
@@ -329,6 +377,9 @@ class Attempt {
   double least_reward_ = 0.0;
   StateBounds bounds_;
   PomdpResult result_;
+  double worth_ = -kUnbounded;  ///< of result_.controller, at least
+  bool frozen_cut_ = false;     ///< the last controller out of Freeze goes on blindly for being too large
+  std::int64_t next_offer_ = 1;
   double next_row_s_ = 0.0;
 };
 

@@ -1,0 +1,170 @@
+#include "feeler/planner/pomdp/model/goal_costs.h"
+
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace feeler::planner {
+namespace {
+
+constexpr double kGoalPrecision = 1e-12;
+constexpr int kSweepsBeforeLu = 300;
+constexpr int kGoalSweeps = 100000;
+constexpr std::size_t kMostForLu = 20000;
+
+/// Marks all that can come to what is marked.
+void SpreadBackwards(const GoalChain& chain, std::vector<std::uint8_t>& marked) {
+  const std::size_t count = marked.size();
+  std::vector<std::size_t> begin(count + 1, 0);
+  const auto row = [&](std::size_t i) {
+    return chain.goal[i] != 0 ? std::span<const SparseEntry>() : chain.rows.Row(i);
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const SparseEntry& next : row(i)) ++begin[next.index + 1];
+  }
+  for (std::size_t i = 0; i < count; ++i) begin[i + 1] += begin[i];
+  std::vector<std::uint32_t> from(begin[count]);
+  std::vector<std::size_t> at(begin.begin(), begin.end() - 1);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (const SparseEntry& next : row(i)) from[at[next.index]++] = i;
+  }
+  std::vector<std::uint32_t> open;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (marked[i] != 0) open.push_back(i);
+  }
+  while (!open.empty()) {
+    const std::uint32_t to = open.back();
+    open.pop_back();
+    for (std::size_t k = begin[to]; k < begin[to + 1]; ++k) {
+      if (marked[from[k]] == 0) marked[from[k]] = 1, open.push_back(from[k]);
+    }
+  }
+}
+
+/// (I - P) w = cost and (I - P) steps = 1 over the states that come to a goal for certain.
+class GoalSystem {
+ public:
+  GoalSystem(const GoalChain& chain, const std::vector<std::uint8_t>& lost) {
+    constexpr std::uint32_t kNone = ~std::uint32_t{0};
+    std::vector<std::uint32_t> number(chain.goal.size(), kNone);
+    for (std::uint32_t i = 0; i < number.size(); ++i) {
+      if (chain.goal[i] != 0 || lost[i] != 0) continue;
+      number[i] = static_cast<std::uint32_t>(states_.size());
+      states_.push_back(i);
+    }
+    std::vector<SparseEntry> row;
+    for (std::uint32_t i = 0; i < states_.size(); ++i) {
+      row.clear();
+      double leaves = 0.0;  // summed up itself: 1 - what stays would be rounding where that is almost 1
+      for (const SparseEntry& next : chain.rows.Row(states_[i])) {
+        if (number[next.index] == i) continue;
+        leaves += next.value;
+        if (number[next.index] != kNone) row.push_back({number[next.index], next.value});
+      }
+      leaves_.push_back(leaves);
+      rows_.Append(row);
+      cost_.push_back(chain.cost[states_[i]]);
+    }
+    values_.assign(states_.size(), 0.0);
+    steps_ = values_;
+  }
+
+  bool Solve(const std::function<bool()>& stop) {
+    for (int sweep = 0; sweep < kGoalSweeps; ++sweep) {
+      if (Sweep()) return true;
+      if (stop && stop()) return false;
+      if (sweep == kSweepsBeforeLu && states_.size() <= kMostForLu) return Direct();
+    }
+    return false;
+  }
+
+  /// Adds what the residuals may amount to.
+  bool Bound(std::vector<double>& costs) const {
+    double residual = 0.0;
+    double residual_steps = 0.0;
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      residual = std::max(residual, Residual(i, cost_[i], values_));
+      residual_steps = std::max(residual_steps, Residual(i, 1.0, steps_));
+    }
+    if (!(residual_steps <= 0.5)) return false;
+    for (std::size_t i = 0; i < states_.size(); ++i) {
+      costs[states_[i]] = values_[i] + residual * steps_[i] / (1.0 - residual_steps);
+    }
+    return std::ranges::all_of(states_, [&](std::uint32_t i) { return std::isfinite(costs[i]); });
+  }
+
+ private:
+  double Residual(std::size_t i, double cost, const std::vector<double>& values) const {
+    double sum = cost - leaves_[i] * values[i];
+    for (const SparseEntry& next : rows_.Row(i)) sum += next.value * values[next.index];
+    return sum;
+  }
+
+  /// True if nothing changes any more. Backwards: successors come after what leads to them, mostly.
+  bool Sweep() {
+    double change = 0.0;
+    for (std::size_t i = states_.size(); i-- > 0;) {
+      double value = cost_[i];
+      double steps = 1.0;
+      for (const SparseEntry& next : rows_.Row(i)) {
+        value += next.value * values_[next.index];
+        steps += next.value * steps_[next.index];
+      }
+      value /= leaves_[i];
+      steps /= leaves_[i];
+      change = std::max({change, (value - values_[i]) / std::max(1.0, value), (steps - steps_[i]) / steps});
+      values_[i] = value;
+      steps_[i] = steps;
+    }
+    return change <= kGoalPrecision;
+  }
+
+  bool Direct() {
+    const auto size = static_cast<Eigen::Index>(states_.size());
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::MatrixXd right(size, 2);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const auto state = static_cast<std::size_t>(i);
+      entries.emplace_back(i, i, leaves_[state]);
+      for (const SparseEntry& next : rows_.Row(state)) entries.emplace_back(i, next.index, -next.value);
+      right(i, 0) = cost_[state];
+      right(i, 1) = 1.0;
+    }
+    Eigen::SparseMatrix<double> matrix(size, size);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
+    if (lu.info() != Eigen::Success) return false;
+    Eigen::MatrixXd solution = lu.solve(right);
+    solution += lu.solve(right - matrix * solution);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      values_[static_cast<std::size_t>(i)] = solution(i, 0);
+      steps_[static_cast<std::size_t>(i)] = solution(i, 1);
+    }
+    return true;
+  }
+
+  std::vector<std::uint32_t> states_;
+  SparseRows rows_;
+  std::vector<double> leaves_, cost_;
+  std::vector<double> values_, steps_;
+};
+
+}  // namespace
+
+std::optional<std::vector<double>> GoalCosts(const GoalChain& chain, const std::function<bool()>& stop) {
+  std::vector<std::uint8_t> lost = chain.goal;
+  SpreadBackwards(chain, lost);
+  for (std::uint8_t& mark : lost) mark = mark != 0 ? 0 : 1;  // cannot come to a goal
+  SpreadBackwards(chain, lost);
+  std::vector<double> costs(chain.goal.size(), 0.0);
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    if (lost[i] != 0) costs[i] = std::numeric_limits<double>::infinity();
+  }
+  GoalSystem system(chain, lost);
+  if (!system.Solve(stop) || !system.Bound(costs)) return std::nullopt;
+  return costs;
+}
+
+}  // namespace feeler::planner
