@@ -68,8 +68,14 @@ class Parser {
     tokens_.Fail("E: belongs to another format", "leave it out");
   }
 
+  /// Tables refer to what stands before them: given again later it would mean another model.
+  void RequireOnce(int& first_line, const char* what) {
+    if (first_line > 0) tokens_.Fail(fmt::format("{} twice (first on line {})", what, first_line), "leave one out");
+    first_line = tokens_.line();
+  }
+
   void Discount() {
-    discount_line_ = tokens_.line();
+    RequireOnce(discount_line_, "discount:");
     discount_ = tokens_.Number("the discount");
     if (!(*discount_ > 0.0 && *discount_ <= 1.0)) {
       tokens_.Fail(fmt::format("discount {:g} is not in (0, 1]", *discount_), "give one above 0 and at most 1");
@@ -77,12 +83,17 @@ class Parser {
   }
 
   void Values() {
+    RequireOnce(values_line_, "values:");
+    if (rewards_ && rewards_->size() > 0) tokens_.Fail("values: after rewards", "give it before the first R:");
     const std::string_view word = tokens_.Next("reward or cost");
     if (word != "reward" && word != "cost") tokens_.Fail("values must be reward or cost", "choose one");
     costs_ = word == "cost";
   }
 
   void List(Names& list) {
+    if (&list == &observations_ && mdp_) {
+      tokens_.Fail("observations: after the tables", "give it before the first T:, O: or R:");
+    }
     if (list.count > 0) tokens_.Fail(fmt::format("{}s given twice", list.kind), "leave one list out");
     const int line = tokens_.line();
     while (!tokens_.AtStatement()) {
@@ -96,7 +107,7 @@ class Parser {
         break;
       }
       const char first = word[0];
-      if (word == ":" || word == "*" || (first >= '0' && first <= '9')) {
+      if (word == ":" || word == "*" || (first >= '0' && first <= '9') || CassandraTokens::IsNumber(word)) {
         tokens_.Fail(fmt::format("\"{}\" is no name of a {}", word, list.kind),
                      "give a count, or names that begin with a letter");
       }
@@ -266,6 +277,7 @@ class Parser {
   }
 
   /// `R: a : s : s' : o r`, `R: a : s : s' row`, `R: a : s matrix`, `R: a matrix` (states by states: of an MDP).
+  /// Without observations also `R: a : s : s' r` and `R: a : s row`, over the states on arrival.
   void Reward() {
     constexpr std::uint32_t kAny = RewardStatements::kAny;
     const Range a = Name(actions_, true);
@@ -280,11 +292,14 @@ class Parser {
     }
     const Range s = Name(states_, true);
     if (!tokens_.Accept(":")) {
-      for (std::uint32_t to = 0; to < states_.count; ++to) RewardRow(a, s, to);
+      for (std::uint32_t to = 0; to < states_.count; ++to) {
+        if (mdp_) RequireMore(states_.count, to);
+        mdp_ ? SetReward(a, s, to, kAny) : RewardRow(a, s, to);
+      }
       return;
     }
     const Range to = Name(states_, true);
-    if (!tokens_.Accept(":")) return RewardRow(a, s, to.or_any());
+    if (!tokens_.Accept(":")) return mdp_ ? SetReward(a, s, to.or_any(), kAny) : RewardRow(a, s, to.or_any());
     const Range o = Name(observations_, true);
     SetReward(a, s, to.or_any(), o.or_any());
   }
@@ -302,7 +317,7 @@ class Parser {
     const bool include = tokens_.Accept("include");
     const bool exclude = !include && tokens_.Accept("exclude");
     tokens_.Expect(":", "\":\"");
-    start_line_ = tokens_.line();
+    RequireOnce(start_line_, "start:");
     if (include || exclude) {
       std::vector<std::uint8_t> in(states_.count, exclude ? 1 : 0);
       while (!tokens_.AtStatement()) in[Name(states_, false).begin] = include ? 1 : 0;
@@ -331,6 +346,7 @@ class Parser {
     });
     start_ = finished.entries;
   }
+
   Pomdp Finish() {
     Pomdp pomdp;
     pomdp.name = name_;
@@ -342,10 +358,12 @@ class Parser {
     const auto fail = [&](const char* table, const char* state) {
       return [&, table, state](std::size_t row, double sum, int line) {
         const std::size_t s = row % states_.count;
-        tokens_.FailAt(line > 0 ? line : tokens_.line(),
-                       fmt::format("{}: {} : {} ({}): the probabilities sum to {:.6g}, not 1", table,
-                                   pomdp.actions[row / states_.count], pomdp.states[s], state, sum),
-                       line > 0 ? "mend the row" : "the file gives none");
+        tokens_.FailAt(
+            line > 0 ? line : tokens_.line(),
+            fmt::format("{}: {} : {} ({}): {}", table, pomdp.actions[row / states_.count], pomdp.states[s], state,
+                        line > 0 ? fmt::format("the probabilities sum to {:.6g}, not 1", sum)
+                                 : std::string("the file gives no probabilities")),
+            line > 0 ? "mend the row" : "give the row");
       };
     };
     pomdp.transitions = transitions_->Finish(fail("T", "state before"));
@@ -379,7 +397,7 @@ class Parser {
   CassandraTokens tokens_;
   std::string name_;
   std::optional<double> discount_;
-  int discount_line_ = 1, start_line_ = 1, first_gain_line_ = 0, first_loss_line_ = 0;
+  int discount_line_ = 0, values_line_ = 0, start_line_ = 0, first_gain_line_ = 0, first_loss_line_ = 0;
   bool costs_ = false, mdp_ = false;
   Names states_{"state", 0, {}, {}}, actions_{"action", 0, {}, {}}, observations_{"observation", 0, {}, {}};
   std::optional<RowsBuilder> transitions_, observation_rows_;

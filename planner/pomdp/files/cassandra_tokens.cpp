@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <utility>
 
 #include "feeler/core/error.h"
@@ -23,7 +24,10 @@ std::string Shown(std::string_view word) {
 
 }  // namespace
 
-CassandraTokens::CassandraTokens(std::string_view text, std::string name) : name_(std::move(name)), text_(text) {}
+CassandraTokens::CassandraTokens(std::string_view text, std::string name) : name_(std::move(name)), text_(text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+}
 
 bool CassandraTokens::Ahead(std::size_t count) const {
   while (ahead_.size() <= count && at_ < text_.size()) {
@@ -82,7 +86,10 @@ bool CassandraTokens::IsNumber(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size() && std::isfinite(value) &&
+  // What is too small for a double reads as 0, what is too large is no number.
+  const bool tiny =
+      error == std::errc::result_out_of_range && std::abs(std::strtod(std::string(word).c_str(), nullptr)) < 1.0;
+  return (error == std::errc() || tiny) && end == word.data() + word.size() && std::isfinite(value) &&
          (word[0] == '-' || word[0] == '.' || (word[0] >= '0' && word[0] <= '9'));
 }
 

@@ -1,5 +1,7 @@
 #include "feeler/planner/pomdp/files/pomdp_file.h"
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,7 +18,9 @@ Pomdp ReadPomdp(const std::string& path) {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw InputError(path, "cannot be read", "check its permissions");
   const std::string name = std::filesystem::path(path).filename().string();
-  return path.ends_with(".pomdpx") ? ParsePomdpx(text, name) : ParseCassandraPomdp(text, name);
+  std::string extension = std::filesystem::path(path).extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension == ".pomdpx" ? ParsePomdpx(text, name) : ParseCassandraPomdp(text, name);
 }
 
 }  // namespace feeler::planner

@@ -104,6 +104,19 @@ TEST(CassandraParser, WithoutObservationsTheStateIsObserved) {
   EXPECT_EQ(AsMap(p.observation_rows.Row(1)), (Row{{1, 1.0}}));
 }
 
+TEST(CassandraParser, RewardsOfAnMdp) {
+  const std::string head = "discount: 0.9\nvalues: reward\nstates: 2\nactions: 2\nT: * uniform\n";
+  const Pomdp p = Parse(head + "R: 0 : 0 : 0 1\nR: 0 : 0 : 1 2\nR: 0 : 1 : * 4\nR: 1 : 0\n6 8\nR: 1 : 1 : * : * 9\n");
+  EXPECT_EQ(p.reward, (std::vector<double>{1.5, 4.0, 7.0, 9.0}));
+  EXPECT_THAT(ErrorOf(head + "R: 0 : 0\n1\nR: 1 : 0 : 0 1\n"), testing::HasSubstr("1 of 2 numbers"));
+}
+
+TEST(CassandraParser, MarksAndNumbersOfOtherPrograms) {
+  EXPECT_EQ(Parse("\xEF\xBB\xBF" + kHead + kTables).state_count(), 3U);
+  EXPECT_EQ(AsMap(Parse(kHead + "start: 1.0 1e-400 0.0\n" + kTables).start), (Row{{0, 1.0}}));
+  EXPECT_THAT(ErrorOf(kHead + kTables + "R: go : a : * : * 1e400\n"), testing::HasSubstr("file:8: \"1e400\""));
+}
+
 TEST(CassandraParser, WhatIsWrittenReadsBack) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Pomdp p = Parse(RandomModelText(seed, 4, 3, 3, 0.9));
@@ -129,7 +142,17 @@ TEST(CassandraParser, MalformedFilesNameTheLine) {
       {kHead + kTables + "T: go : a\n0.5 0.2 0.2\n", "file:9: T: go : a (state before): the probabilities sum to 0.9"},
       {kHead + "T: * identity\nO: * uniform\nO: stay : c : x 0.1\n",
        "file:8: O: stay : c (state on arrival): the probabilities sum to 0.6"},
-      {kHead + "T: * identity\n", "file:6: O: go : a"},
+      {kHead + "T: * identity\n",
+       "file:6: O: go : a (state on arrival): the file gives no probabilities (give the row)"},
+      {kHead + kTables + "R: go : a : * : * 1\nvalues: cost\n", "file:9: values: twice (first on line 2)"},
+      {kHead + "discount: 0.8\n" + kTables, "file:6: discount: twice (first on line 1)"},
+      {kHead + "start: a\nstart: b\n" + kTables, "file:7: start: twice (first on line 6)"},
+      {kHead + "start: a\nstart include: b\n" + kTables, "file:7: start: twice (first on line 6)"},
+      {"discount: 0.9\nstates: 2\nactions: 1\nT: 0 identity\nR: 0 : 0 : 0 1\nvalues: cost\n",
+       "file:6: values: after rewards"},
+      {"discount: 0.9\nstates: 2\nactions: 1\nT: 0 identity\nobservations: 2\n",
+       "file:5: observations: after the tables"},
+      {"discount: 0.9\nstates: -2\nactions: 1\n", "file:2: \"-2\" is no name of a state"},
       {kHead + "T: fly : a : b 1.0\n", "file:6: unknown action \"fly\""},
       {kHead + "T: go : z : b 1.0\n", "file:6: unknown state \"z\""},
       {kHead + "T: go : 7 : b 1.0\n", "file:6: state 7 of 3"},
