@@ -10,7 +10,7 @@ FactorTable::FactorTable(const std::vector<FactorVariable>& variables, std::vect
   if (has_target) target_ = scope_.back();
 }
 
-void FactorTable::Set(const std::vector<std::uint32_t>& instance, double value) {
+void FactorTable::Set(const std::vector<std::uint32_t>& instance, double value, int line) {
   std::vector<std::size_t> given;
   std::uint64_t key = 0;
   for (std::size_t i = 0; i < parents(); ++i) {
@@ -23,7 +23,7 @@ void FactorTable::Set(const std::vector<std::uint32_t>& instance, double value) 
   std::vector<Item>& items = pattern->items[key];
   const std::uint32_t target = target_ == kNoTarget ? kAny : instance.back();
   if (target == kAny) items.clear();  // overrides them all
-  items.push_back({target, value, ++order_});
+  items.push_back({target, value, ++order_, line});
 }
 
 std::uint32_t FactorTable::Add(Node node) {
@@ -50,14 +50,38 @@ double FactorTable::NodeValue(std::uint32_t node, const Assignment& at) const {
   return n->value;
 }
 
+std::uint32_t FactorTable::NodeOfParents(const Assignment& at) const {
+  std::uint32_t node = root_;
+  while (nodes_[node].kind == NodeKind::kBranch && nodes_[node].variable != target_) {
+    node = nodes_[node].children[at[nodes_[node].variable]];
+  }
+  return node;
+}
+
+std::vector<const FactorTable::Item*> FactorTable::ItemsOf(const Assignment& at) const {
+  std::vector<const Item*> items;
+  for (const Pattern& pattern : patterns_) {
+    std::uint64_t key = 0;
+    for (const std::size_t i : pattern.given) key = key * variables_[scope_[i]].count() + at[scope_[i]];
+    const auto found = pattern.items.find(key);
+    if (found == pattern.items.end()) continue;
+    for (const Item& item : found->second) items.push_back(&item);
+  }
+  if (patterns_.size() > 1) std::ranges::sort(items, {}, &Item::order);
+  return items;
+}
+
+int FactorTable::LineOf(const Assignment& at) const {
+  if (!nodes_.empty()) return nodes_[NodeOfParents(at)].line;
+  const std::vector<const Item*> items = ItemsOf(at);
+  return items.empty() ? line_ : items.back()->line;
+}
+
 void FactorTable::Distribution(Assignment& at, std::vector<SparseEntry>& out) const {
   out.clear();
   const std::size_t count = variables_[target_].count();
   if (!nodes_.empty()) {
-    std::uint32_t node = root_;
-    while (nodes_[node].kind == NodeKind::kBranch && nodes_[node].variable != target_) {
-      node = nodes_[node].children[at[nodes_[node].variable]];
-    }
+    const std::uint32_t node = NodeOfParents(at);
     const Node& n = nodes_[node];
     if (n.kind == NodeKind::kDeterministic && n.variable == target_) return out.push_back({n.chosen, 1.0});
     if (n.kind == NodeKind::kPersistent && n.variable == target_) return out.push_back({at[n.before], 1.0});
@@ -68,15 +92,7 @@ void FactorTable::Distribution(Assignment& at, std::vector<SparseEntry>& out) co
     }
     return;
   }
-  std::vector<const Item*> items;
-  for (const Pattern& pattern : patterns_) {
-    std::uint64_t key = 0;
-    for (const std::size_t i : pattern.given) key = key * variables_[scope_[i]].count() + at[scope_[i]];
-    const auto found = pattern.items.find(key);
-    if (found == pattern.items.end()) continue;
-    for (const Item& item : found->second) items.push_back(&item);
-  }
-  if (patterns_.size() > 1) std::ranges::sort(items, {}, &Item::order);
+  const std::vector<const Item*> items = ItemsOf(at);
   const auto put = [&](std::uint32_t v, double p) {
     const auto found = std::ranges::find(out, v, &SparseEntry::index);
     if (found != out.end()) {

@@ -30,8 +30,8 @@ class FactorTable {
   /// `scope`: indices of the parents, then of the target where there is one. The variables must outlive the table.
   FactorTable(const std::vector<FactorVariable>& variables, std::vector<std::size_t> scope, bool has_target, int line);
 
-  /// A table entry: a value or kAny for each variable of the scope.
-  void Set(const std::vector<std::uint32_t>& instance, double value);
+  /// A table entry: a value or kAny for each variable of the scope; `line` of the file.
+  void Set(const std::vector<std::uint32_t>& instance, double value, int line);
   std::size_t entries() const { return order_; }
 
   /// Nodes of the diagram; the root is the one added last. Return the number of the node.
@@ -43,6 +43,7 @@ class FactorTable {
     std::uint32_t chosen = 0;             ///< kDeterministic
     std::size_t before = 0;               ///< kPersistent: the variable whose value stays
     std::vector<std::uint32_t> children;  ///< kBranch: one a value
+    int line = 0;
   };
   std::uint32_t Add(Node node);
   void SetRoot(std::uint32_t node) { root_ = node; }
@@ -55,6 +56,8 @@ class FactorTable {
   const std::vector<std::size_t>& scope() const { return scope_; }
   std::size_t target() const { return target_; }
   int line() const { return line_; }
+  /// Of what gives the distribution for an assignment of the parents: the last entry, the branch of the diagram.
+  int LineOf(const Assignment& at) const;
   /// Index in the scope; -1 where it is not in it.
   int Position(std::size_t variable) const;
   /// "a, s0" : the values of the parents, for errors.
@@ -65,6 +68,7 @@ class FactorTable {
     std::uint32_t target = kAny;
     double value = 0.0;
     std::size_t order = 0;
+    int line = 0;
   };
   /// Entries that give the same parents; all others are wildcards there.
   struct Pattern {
@@ -72,6 +76,10 @@ class FactorTable {
     std::unordered_map<std::uint64_t, std::vector<Item>> items;
   };
   std::size_t parents() const { return scope_.size() - (target_ == kNoTarget ? 0 : 1); }
+  /// The node that the values of the parents lead to.
+  std::uint32_t NodeOfParents(const Assignment& at) const;
+  /// The entries for the values of the parents, by ascending order.
+  std::vector<const Item*> ItemsOf(const Assignment& at) const;
   double NodeValue(std::uint32_t node, const Assignment& at) const;
 
   const std::vector<FactorVariable>& variables_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/files/table_builder.h"
@@ -50,6 +51,20 @@ class JointValues {
   std::unordered_map<std::uint64_t, std::uint32_t> number_;
   std::vector<std::uint64_t> keys_;
 };
+
+/// Makes names different that came out the same ("a" and "b.c", "a.b" and "c").
+void Distinguish(std::vector<std::string>& names) {
+  std::unordered_set<std::string> taken(names.begin(), names.end());
+  if (taken.size() == names.size()) return;
+  std::unordered_set<std::string> met;
+  for (std::string& name : names) {
+    if (met.insert(name).second) continue;
+    std::string other;
+    for (int k = 2; other.empty() || !taken.insert(other).second; ++k) other = fmt::format("{}.{}", name, k);
+    name = other;
+    met.insert(name);
+  }
+}
 
 double Product(const std::vector<FactorVariable>& variables, const std::vector<std::size_t>& members) {
   double product = 1.0;
@@ -129,7 +144,7 @@ class Joiner {
     double sum = 0.0;
     for (const SparseEntry& entry : distribution) sum += entry.value;
     if (!(std::abs(sum - 1.0) <= kSumTolerance)) {
-      throw InputError(fmt::format("{}:{}", factored_.name, table.line()),
+      throw InputError(fmt::format("{}:{}", factored_.name, table.LineOf(at_)),
                        fmt::format("the probabilities of {} given {} sum to {:.6g}, not 1",
                                    factored_.variables[table.target()].name, table.Describe(at_), sum),
                        "mend the table");
@@ -140,19 +155,40 @@ class Joiner {
     }
   }
 
-  void Start() {
-    // What is uniform over too many states is refused before it is written out.
-    double states = 1.0;
+  /// A lower bound of the joint values of the targets that any values of the parents leave possible.
+  double LeastOutcomes(const std::vector<const FactorTable*>& tables) {
+    constexpr double kMostParents = 4096.0;
+    double product = 1.0;
     std::vector<SparseEntry> distribution;
-    for (const FactorTable* table : initial_) {
-      if (table->scope().size() > 1) continue;
-      table->Distribution(at_, distribution);
-      states *= static_cast<double>(std::max<std::size_t>(1, distribution.size()));
+    for (const FactorTable* table : tables) {
+      std::vector<std::size_t> parents = table->scope();
+      std::erase(parents, table->target());
+      const double assignments = Product(factored_.variables, parents);
+      if (assignments > kMostParents) continue;
+      std::size_t least = factored_.variables[table->target()].count();
+      for (std::size_t number = 0; number < static_cast<std::size_t>(assignments); ++number) {
+        std::size_t rest = number;
+        for (const std::size_t v : parents) {
+          at_[v] = static_cast<std::uint32_t>(rest % factored_.variables[v].count());
+          rest /= factored_.variables[v].count();
+        }
+        table->Distribution(at_, distribution);
+        least = std::min(least, distribution.size());
+      }
+      product *= static_cast<double>(std::max<std::size_t>(1, least));
     }
-    RequireFits(factored_.name, states, action_count_, states * action_count_ * 2.0);
+    return product;
+  }
+
+  void Start() {
+    // What has too many outcomes whatever the parents are is refused before it is written out.
+    const double states = LeastOutcomes(initial_);
+    const double entries = states * action_count_ * (LeastOutcomes(transitions_) + LeastOutcomes(sensors_));
+    RequireFits(factored_.name, states, action_count_, entries);
     ForEach(initial_, 0, 1.0, [&](double p) {
       for (std::size_t i = 0; i < before_.size(); ++i) at_[after_[i]] = at_[before_[i]];
       start_.push_back({states_.Number(at_), p});
+      RequireSpace(0.0);
     });
   }
 
@@ -162,6 +198,12 @@ class Joiner {
       at_[factored_.actions[i]] = static_cast<std::uint32_t>(number % count);
       number /= count;
     }
+  }
+
+  /// What is joined so far, and `more` probabilities, must fit.
+  void RequireSpace(double more) const {
+    RequireFits(factored_.name, static_cast<double>(states_.size()), action_count_,
+                static_cast<double>(entries_) + more);
   }
 
   bool NeedsSensors(const FactorTable& reward) const {
@@ -178,6 +220,7 @@ class Joiner {
       double reward = 0.0;
       ForEach(transitions_, 0, 1.0, [&](double p) {
         row.push_back({states_.Number(at_), p});
+        RequireSpace(static_cast<double>(row.size()));
         for (const FactorTable& table : factored_.rewards) {
           if (!NeedsSensors(table)) {
             reward += p * table.Value(at_);
@@ -191,7 +234,6 @@ class Joiner {
       rows_.push_back(std::move(row));
       rewards_.push_back(reward);
     }
-    RequireFits(factored_.name, static_cast<double>(states_.size()), action_count_, static_cast<double>(entries_));
   }
 
   Pomdp Assemble() {
@@ -215,12 +257,17 @@ class Joiner {
         pomdp.reward.push_back(rewards_[s * actions + a]);
         states_.Decode(s, after_, at_);
         row.clear();
-        ForEach(sensors_, 0, 1.0, [&](double p) { row.push_back({observations_.Number(at_), p}); });
+        ForEach(sensors_, 0, 1.0, [&](double p) {
+          row.push_back({observations_.Number(at_), p});
+          RequireSpace(static_cast<double>(row.size() + observations_.size()));
+        });
+        entries_ += row.size();
         std::ranges::sort(row, {}, &SparseEntry::index);
         pomdp.observation_rows.Append(row);
       }
     }
     for (std::size_t o = 0; o < observations_.size(); ++o) pomdp.observations.push_back(observations_.Name(o));
+    for (std::vector<std::string>* names : {&pomdp.states, &pomdp.actions, &pomdp.observations}) Distinguish(*names);
     return pomdp;
   }
 

@@ -42,6 +42,8 @@ class Reader {
       throw InputError(fmt::format("{}:{}", model_.name, root == nullptr ? 1 : root->GetLineNum()),
                        "the root is no <pomdpx>", "give a PomdpX file");
     }
+    RequireKnown(*root, {"Description", "Discount", "Variable", "InitialStateBelief", "StateTransitionFunction",
+                         "ObsFunction", "RewardFunction"});
     const XMLElement& discount = Child(*root, "Discount");
     model_.discount_line = discount.GetLineNum();
     model_.discount = Number(discount, Word(discount));
@@ -67,6 +69,28 @@ class Reader {
     if (child == nullptr) Fail(of, fmt::format("<{}> without <{}>", of.Name(), name), "add it");
     return *child;
   }
+  /// Nothing but these in an element, each once at most but for what ends in '*'.
+  void RequireKnown(const XMLElement& of, std::initializer_list<std::string_view> known) const {
+    std::vector<std::string_view> met;
+    for (const XMLElement* e = of.FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+      const std::string_view name = e->Name();
+      if (std::ranges::find(known, std::string(name) + "*") != known.end()) continue;
+      if (std::ranges::find(known, name) == known.end()) {
+        Fail(*e, fmt::format("<{}> in <{}>", name, of.Name()), fmt::format("{} belong there", Listed(known)));
+      }
+      if (std::ranges::find(met, name) != met.end()) {
+        Fail(*e, fmt::format("<{}> twice in <{}>", name, of.Name()), "leave one out");
+      }
+      met.push_back(name);
+    }
+  }
+  static std::string Listed(std::initializer_list<std::string_view> names) {
+    std::string text;
+    for (const std::string_view name : names) {
+      text += (text.empty() ? "" : ", ") + std::string(name.substr(0, name.find('*')));
+    }
+    return text;
+  }
   std::string Word(const XMLElement& element) const {
     const std::vector<std::string> words = Words(element.GetText());
     if (words.size() != 1) Fail(element, fmt::format("<{}> should hold one word", element.Name()), "give it");
@@ -79,6 +103,10 @@ class Reader {
     std::from_chars(word.data(), word.data() + word.size(), value);
     return value;
   }
+  void RequireProbability(const XMLElement& element, double value) const {
+    if (value >= 0.0 && value <= 1.0 + kSumTolerance) return;
+    Fail(element, fmt::format("{:g} is no probability", value), "give 0 to 1");
+  }
   std::string Attribute(const XMLElement& element, const char* name) const {
     const char* value = element.Attribute(name);
     if (value == nullptr || *value == 0) Fail(element, fmt::format("<{}> without {}", element.Name(), name), "add it");
@@ -87,6 +115,10 @@ class Reader {
 
   /// `<ValueEnum>` names or `<NumValues>`: s0, s1, ... as the format says.
   std::vector<std::string> Values(const XMLElement& element, const char* prefix) const {
+    RequireKnown(element, {"ValueEnum", "NumValues"});
+    if (element.FirstChildElement("ValueEnum") != nullptr && element.FirstChildElement("NumValues") != nullptr) {
+      Fail(element, "values and their number", "leave one out");
+    }
     if (const XMLElement* names = element.FirstChildElement("ValueEnum")) {
       std::vector<std::string> values = Words(names->GetText());
       if (values.empty()) Fail(*names, "no values", "list them");
@@ -125,7 +157,11 @@ class Reader {
         const std::vector<std::string> values = Values(*v, "s");
         const std::size_t before = AddVariable(*v, Attribute(*v, "vnamePrev"), values, 'b');
         const std::size_t after = AddVariable(*v, Attribute(*v, "vnameCurr"), values, 'a');
-        model_.states.push_back({before, after, v->BoolAttribute("fullyObs", false)});
+        const std::string observed = v->Attribute("fullyObs") == nullptr ? "false" : v->Attribute("fullyObs");
+        if (observed != "true" && observed != "false") {
+          Fail(*v, fmt::format("fullyObs=\"{}\"", observed), "true or false");
+        }
+        model_.states.push_back({before, after, observed == "true"});
       } else if (kind == "ObsVar") {
         model_.observations.push_back(AddVariable(*v, Attribute(*v, "vname"), Values(*v, "o"), 'o'));
       } else if (kind == "ActionVar") {
@@ -157,6 +193,31 @@ class Reader {
     return found->second;
   }
 
+  /// The parents of a table, then its variable unless it is a reward.
+  std::vector<std::size_t> Scope(const XMLElement& f, std::string_view targets, std::string_view parents) const {
+    RequireKnown(f, {"Var", "Parent", "Parameter"});
+    std::vector<std::size_t> scope;
+    const XMLElement* list = f.FirstChildElement("Parent");
+    for (const std::string& word : Words(list == nullptr ? nullptr : list->GetText())) {
+      if (word == "null") continue;
+      scope.push_back(Variable(*list, word, parents));
+      if (std::ranges::count(scope, scope.back()) > 1) {
+        Fail(*list, fmt::format("parent \"{}\" twice", word), "leave one out");
+      }
+    }
+    const XMLElement& var = Child(f, "Var");
+    const std::string name = Word(var);
+    if (!targets.empty()) {
+      scope.push_back(Variable(var, name, targets));
+      if (std::ranges::count(scope, scope.back()) > 1) {
+        Fail(*list, fmt::format("variable \"{}\" is a parent of its own", name), "leave it out");
+      }
+    } else if (std::ranges::find(reward_names_, name) == reward_names_.end()) {
+      Fail(var, fmt::format("unknown reward variable \"{}\"", name), "declare it as a RewardVar");
+    }
+    return scope;
+  }
+
   /// All tables of a section. `targets` and `parents`: kinds of variables that may stand there (u action, b state
   /// before, a state after, o observation).
   void Tables(const XMLElement& section, const char* kind, std::string_view targets, std::string_view parents,
@@ -164,19 +225,7 @@ class Reader {
     for (const XMLElement* f = section.FirstChildElement(); f != nullptr; f = f->NextSiblingElement()) {
       if (std::string_view(f->Name()) != kind)
         Fail(*f, fmt::format("<{}> in <{}>", f->Name(), section.Name()), fmt::format("<{}> belongs here", kind));
-      std::vector<std::size_t> scope;
-      if (const XMLElement* list = f->FirstChildElement("Parent")) {
-        for (const std::string& word : Words(list->GetText())) {
-          if (word != "null") scope.push_back(Variable(*list, word, parents));
-        }
-      }
-      const XMLElement& var = Child(*f, "Var");
-      const std::string name = Word(var);
-      if (!targets.empty()) {
-        scope.push_back(Variable(var, name, targets));
-      } else if (std::ranges::find(reward_names_, name) == reward_names_.end()) {
-        Fail(var, fmt::format("unknown reward variable \"{}\"", name), "declare it as a RewardVar");
-      }
+      const std::vector<std::size_t> scope = Scope(*f, targets, parents);
       double size = 1.0;
       for (const std::size_t v : scope) size *= static_cast<double>(model_.variables[v].count());
       if (size > 1e18) Fail(*f, "a table over too many values", "leave parents out");
@@ -184,6 +233,7 @@ class Reader {
       const XMLElement& parameter = Child(*f, "Parameter");
       const std::string type = parameter.Attribute("type") == nullptr ? "TBL" : parameter.Attribute("type");
       if (type == "TBL") {
+        RequireKnown(parameter, {"Entry*"});
         for (const XMLElement* e = parameter.FirstChildElement("Entry"); e != nullptr;
              e = e->NextSiblingElement("Entry")) {
           Entry(*e, table, !targets.empty());
@@ -198,6 +248,7 @@ class Reader {
 
   /// `*` stands for every value; `-` too, with a number of the table for each, the last `-` fastest.
   void Entry(const XMLElement& entry, FactorTable& table, bool probability) {
+    RequireKnown(entry, {"Instance", "ProbTable", "ValueTable"});
     const XMLElement& instance = Child(entry, "Instance");
     const std::vector<std::string> words = Words(instance.GetText());
     const std::vector<std::size_t>& scope = table.scope();
@@ -244,18 +295,17 @@ class Reader {
       double value = share;
       if (identity) value = at[listed[0]] == at[listed[1]] ? 1.0 : 0.0;
       if (!uniform && !identity) value = Number(*values, numbers[n]);
-      if (probability && !(value >= 0.0 && value <= 1.0 + kSumTolerance)) {
-        Fail(*values, fmt::format("{:g} is no probability", value), "give 0 to 1");
-      }
-      table.Set(at, value);
+      if (probability) RequireProbability(*values, value);
+      table.Set(at, value, entry.GetLineNum());
     }
   }
 
   void Diagram(const XMLElement& parameter, FactorTable& table) {
+    RequireKnown(parameter, {"DAG", "SubDAGTemplate*"});
     std::map<std::string, const XMLElement*> templates;
     for (const XMLElement* t = parameter.FirstChildElement("SubDAGTemplate"); t != nullptr;
          t = t->NextSiblingElement("SubDAGTemplate")) {
-      templates[Attribute(*t, "id")] = t;
+      if (!templates.emplace(Attribute(*t, "id"), t).second) Fail(*t, "a template twice", "leave one out");
     }
     std::map<std::string, std::uint32_t> shared;
     table.SetRoot(Below(Child(parameter, "DAG"), table, templates, shared, 0));
@@ -270,9 +320,14 @@ class Reader {
     const XMLElement* element = holder.FirstChildElement();
     if (element == nullptr)
       Fail(holder, fmt::format("<{}> holds no branch", holder.Name()), "add a Node, a Terminal or a SubDAG");
+    if (const XMLElement* other = element->NextSiblingElement()) {
+      Fail(*other, fmt::format("<{}> holds more than one branch", holder.Name()), "leave one out");
+    }
     const std::string_view kind = element->Name();
     if (kind == "Terminal") {
-      return table.Add({.kind = Kind::kTerminal, .value = Number(*element, Word(*element)), .children = {}});
+      const double value = Number(*element, Word(*element));
+      if (table.target() != FactorTable::kNoTarget) RequireProbability(*element, value);
+      return table.Add({.kind = Kind::kTerminal, .value = value, .children = {}, .line = element->GetLineNum()});
     }
     if (kind == "Node") return Branch(*element, table, templates, shared, depth);
     if (kind != "SubDAG") Fail(*element, fmt::format("<{}> in a diagram", kind), "Node, Terminal or SubDAG");
@@ -284,23 +339,39 @@ class Reader {
       if (found == templates.end()) Fail(*element, fmt::format("unknown template \"{}\"", id), "add a SubDAGTemplate");
       return shared[id] = Below(*found->second, table, templates, shared, depth + 1);
     }
-    const std::size_t variable = ScopeVariable(*element, table);
-    if (type == "uniform") return table.Add({.kind = Kind::kUniform, .variable = variable, .children = {}});
+    return SubDag(*element, type, table);
+  }
+
+  /// A distribution of the variable of the table.
+  std::uint32_t SubDag(const XMLElement& element, const std::string& type, FactorTable& table) const {
+    using Kind = FactorTable::NodeKind;
+    const std::size_t variable = ScopeVariable(element, table);
+    const int line = element.GetLineNum();
+    if (variable != table.target()) {
+      Fail(element,
+           fmt::format("{} of \"{}\", which is not the variable of the table", type, Attribute(element, "var")),
+           "name that one");
+    }
+    if (type == "uniform") {
+      return table.Add({.kind = Kind::kUniform, .variable = variable, .children = {}, .line = line});
+    }
     if (type == "deterministic") {
       return table.Add({.kind = Kind::kDeterministic,
                         .variable = variable,
-                        .chosen = Value(*element, variable, Attribute(*element, "val")),
-                        .children = {}});
+                        .chosen = Value(element, variable, Attribute(element, "val")),
+                        .children = {},
+                        .line = line});
     }
     if (type != "persistent")
-      Fail(*element, fmt::format("unknown SubDAG \"{}\"", type), "uniform, deterministic, persistent or template");
+      Fail(element, fmt::format("unknown SubDAG \"{}\"", type), "uniform, deterministic, persistent or template");
     for (const FactoredPomdp::StateVariable& s : model_.states) {
       if (s.after != variable) continue;
       if (table.Position(s.before) < 0)
-        Fail(*element, fmt::format("persistent, and \"{}\" is no parent", model_.variables[s.before].name), "add it");
-      return table.Add({.kind = Kind::kPersistent, .variable = variable, .before = s.before, .children = {}});
+        Fail(element, fmt::format("persistent, and \"{}\" is no parent", model_.variables[s.before].name), "add it");
+      return table.Add(
+          {.kind = Kind::kPersistent, .variable = variable, .before = s.before, .children = {}, .line = line});
     }
-    Fail(*element, "persistent of no state variable", "name one on arrival");
+    Fail(element, "persistent of no state variable", "name one on arrival");
   }
 
   std::size_t ScopeVariable(const XMLElement& element, const FactorTable& table) const {
@@ -314,6 +385,7 @@ class Reader {
   std::uint32_t Branch(const XMLElement& node, FactorTable& table,
                        const std::map<std::string, const XMLElement*>& templates,
                        std::map<std::string, std::uint32_t>& shared, int depth) {
+    RequireKnown(node, {"Edge*"});
     const std::size_t variable = ScopeVariable(node, table);
     const FactorVariable& v = model_.variables[variable];
     std::vector<std::optional<std::uint32_t>> children(v.count());
@@ -323,7 +395,8 @@ class Reader {
       if (children[value]) Fail(*edge, fmt::format("branch \"{}\" twice", v.values[value]), "leave one out");
       children[value] = Below(*edge, table, templates, shared, depth + 1);
     }
-    FactorTable::Node branch{.kind = FactorTable::NodeKind::kBranch, .variable = variable, .children = {}};
+    FactorTable::Node branch{
+        .kind = FactorTable::NodeKind::kBranch, .variable = variable, .children = {}, .line = node.GetLineNum()};
     for (std::size_t i = 0; i < children.size(); ++i) {
       if (!children[i])
         Fail(node, fmt::format("no branch for value \"{}\" of \"{}\"", v.values[i], v.name), "add an Edge");
@@ -334,10 +407,18 @@ class Reader {
 
   void RequireAll(const XMLElement& root) const {
     const auto require = [&](const std::vector<FactorTable>& tables, std::size_t variable, const char* section) {
-      const auto count = std::ranges::count(tables, variable, &FactorTable::target);
-      if (count != 1) {
-        Fail(root, fmt::format("{} tables of \"{}\" in <{}>", count, model_.variables[variable].name, section),
-             "give one");
+      const FactorTable* first = nullptr;
+      for (const FactorTable& table : tables) {
+        if (table.target() != variable) continue;
+        if (first != nullptr) {
+          throw InputError(fmt::format("{}:{}", model_.name, table.line()),
+                           fmt::format("a second table of \"{}\" in <{}>", model_.variables[variable].name, section),
+                           "leave one out");
+        }
+        first = &table;
+      }
+      if (first == nullptr) {
+        Fail(root, fmt::format("no table of \"{}\" in <{}>", model_.variables[variable].name, section), "give one");
       }
     };
     for (const FactoredPomdp::StateVariable& s : model_.states) {

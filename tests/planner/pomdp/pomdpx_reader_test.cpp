@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/search/solve_pomdp.h"
@@ -211,14 +212,89 @@ TEST(PomdpxReader, MalformedFilesNameTheLine) {
       {Without(diagram, "<SubDAG type=\"deterministic\" var=\"rock_1\" val=\"bad\"/>"), "<Edge> holds no branch"},
       {Without(diagram, "idref=\"same\"", "idref=\"other\""), "unknown template \"other\""},
       {Without(good, "<NumValues>3</NumValues>", "<NumValues>1000000000</NumValues>"), "file:5: 1e+09 states"},
-      {Without(good, kTableSensor), "0 tables of \"sensor\" in <ObsFunction>"},
+      {Without(good, kTableSensor), "no table of \"sensor\" in <ObsFunction>"},
       {Without(good, "0.95", "1.0"), "file:3: a discount of 1"},
+      // What the format does not know, or knows once.
+      {Without(good, "<Discount>", "<Discount>0.5</Discount><Discount>"), "file:3: <Discount> twice in <pomdpx>"},
+      {Without(Without(good, "<RewardFunction>", "<Rewards>"), "</RewardFunction>", "</Rewards>"),
+       "<Rewards> in <pomdpx>"},
+      {Without(good, "<Entry><Instance>east s1</Instance><ValueTable>10</ValueTable></Entry>",
+               "<Entri><Instance>east s1</Instance><ValueTable>10</ValueTable></Entri>"),
+       "<Entri> in <Parameter>"},
+      {Without(good, "fullyObs=\"true\"", "fullyObs=\"maybe\""), "file:5: fullyObs=\"maybe\""},
+      {Without(good, "<NumValues>3</NumValues>", "<NumValues>3</NumValues><ValueEnum>a b c</ValueEnum>"),
+       "file:5: values and their number"},
+      {Without(good, "<Parent>action rover_0 rock_0</Parent>", "<Parent>action rover_0 rover_0</Parent>"),
+       "parent \"rover_0\" twice"},
+      {Without(good, "<Parent>action rover_1 rock_1</Parent>", "<Parent>action sensor rock_1</Parent>"),
+       "variable \"sensor\" is a parent of its own"},
+      {Without(diagram, "<Edge val=\"ogood\"><Terminal>0.8</Terminal>",
+               "<Edge val=\"ogood\"><Terminal>0.8</Terminal><Terminal>0.8</Terminal>"),
+       "<Edge> holds more than one branch"},
+      {Without(diagram, "<Terminal>0.8</Terminal>", "<Terminal>-0.8</Terminal>"), "-0.8 is no probability"},
+      {Without(diagram, "<SubDAG type=\"deterministic\" var=\"sensor\" val=\"obad\"/>",
+               "<SubDAG type=\"uniform\" var=\"rock_1\"/>"),
+       "uniform of \"rock_1\", which is not the variable of the table"},
+      {Without(good, kTableSensor, kTableSensor + kTableSensor), "a second table of \"sensor\" in <ObsFunction>"},
   };
   for (const auto& [text, error] : cases) {
     EXPECT_THAT(PomdpxErrorOf(text), testing::HasSubstr(error));
     EXPECT_TRUE(PomdpxErrorOf(text).starts_with("file:")) << PomdpxErrorOf(text);
     EXPECT_EQ(PomdpxErrorOf(text).find('\n'), std::string::npos);
   }
+}
+
+int LineOf(const std::string& text, const std::string& part) {
+  return 1 + static_cast<int>(std::ranges::count(text.substr(0, text.find(part)), '\n'));
+}
+
+TEST(PomdpxReader, SumsNameTheEntryOrTheBranch) {
+  const std::string table = Without(Rover(kTableTransitions, kTableSensor), "0.8 0.2 0.2 0.8", "0.8 0.2 0.2 0.7");
+  EXPECT_TRUE(PomdpxErrorOf(table).starts_with("file:" + std::to_string(LineOf(table, "0.8 0.2 0.2 0.7")) + ":"));
+  const std::string diagram =
+      Without(Rover(kDiagramTransitions, kDiagramSensor), "<Terminal>0.8</Terminal>", "<Terminal>0.7</Terminal>");
+  EXPECT_TRUE(PomdpxErrorOf(diagram).starts_with("file:" + std::to_string(LineOf(diagram, "0.7")) + ":"));
+  EXPECT_GT(LineOf(diagram, "0.7"), LineOf(diagram, "<Var>sensor"));
+}
+
+/// `count` binary variables: all start at s0 unless `start` is "uniform"; `stays` or drawn anew; all or none are seen.
+std::string Coins(int count, const std::string& start, bool stays, bool seen) {
+  std::string variables, initial, transitions, sensors;
+  for (int i = 0; i < count; ++i) {
+    const std::string n = std::to_string(i);
+    variables += "<StateVar vnamePrev=\"x" + n + "\" vnameCurr=\"y" + n + "\"><NumValues>2</NumValues></StateVar>";
+    if (seen) variables += "<ObsVar vname=\"o" + n + "\"><NumValues>2</NumValues></ObsVar>";
+    // A parent, so that the size is not the product of what stands alone.
+    const std::string parent = i == 0 ? "null" : "x" + std::to_string(i - 1);
+    initial += "<CondProb><Var>x" + n + "</Var><Parent>" + parent + "</Parent><Parameter>" +
+               Entry(i == 0 ? "-" : "* -", start) + "</Parameter></CondProb>";
+    transitions += "<CondProb><Var>y" + n + "</Var><Parent>a x" + n + "</Parent><Parameter>" +
+                   Entry(stays ? "* - -" : "* * -", stays ? "identity" : "uniform") + "</Parameter></CondProb>";
+    sensors += "<CondProb><Var>o" + n + "</Var><Parent>a</Parent><Parameter>" + Entry("* -", "uniform") +
+               "</Parameter></CondProb>";
+  }
+  return "<pomdpx version=\"1.0\"><Discount>0.9</Discount><Variable>" + variables +
+         "<ActionVar vname=\"a\"><NumValues>1</NumValues></ActionVar><RewardVar vname=\"r\"/></Variable>"
+         "<InitialStateBelief>" +
+         initial + "</InitialStateBelief><StateTransitionFunction>" + transitions + "</StateTransitionFunction>" +
+         (seen ? "<ObsFunction>" + sensors + "</ObsFunction>" : "<ObsFunction/>") + "</pomdpx>";
+}
+
+TEST(PomdpxReader, WhatDoesNotFitIsRefusedWhileItIsJoined) {
+  EXPECT_EQ(ParsePomdpx(Coins(4, "uniform", true, true), "file").state_count(), 16U);
+  EXPECT_THAT(PomdpxErrorOf(Coins(34, "uniform", true, false)), testing::HasSubstr("make the model smaller"));
+  EXPECT_THAT(PomdpxErrorOf(Coins(34, "1 0", false, false)), testing::HasSubstr("make the model smaller"));
+  EXPECT_THAT(PomdpxErrorOf(Coins(34, "1 0", true, true)), testing::HasSubstr("make the model smaller"));
+}
+
+TEST(PomdpxReader, JointNamesAreDifferent) {
+  std::string text = Coins(2, "uniform", true, true);
+  for (const std::string& values : {std::string("a a.b"), std::string("b.c c")}) {
+    text = Without(text, "<NumValues>2</NumValues></ObsVar>", "<ValueEnum>" + values + "</ValueEnum></ObsVar>");
+  }
+  const Pomdp p = ParsePomdpx(text, "file");
+  EXPECT_EQ(std::set<std::string>(p.observations.begin(), p.observations.end()),
+            (std::set<std::string>{"a.b.c", "a.b.c.2", "a.c", "a.b.b.c"}));
 }
 
 TEST(PomdpxReader, NoPrefixOrFlippedByteCrashes) {
