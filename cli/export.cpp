@@ -44,7 +44,8 @@ std::string RockSampleText(const ExportFlags& flags) {
   int size = 0;
   int rocks = 0;
   char rest = 0;
-  if (std::sscanf(flags.rock_sample.c_str(), "%4dx%4d%c", &size, &rocks, &rest) != 2) {
+  const bool digits = flags.rock_sample.find_first_not_of("0123456789x") == std::string::npos;
+  if (!digits || std::sscanf(flags.rock_sample.c_str(), "%4dx%4d%c", &size, &rocks, &rest) != 2) {
     throw InputError("--rock-sample", "\"" + flags.rock_sample + "\"", "give size and rocks, e.g. 7x8");
   }
   const planner::Pomdp pomdp = planner::MakeRockSample(planner::DrawRockSample(size, rocks, flags.seed));
@@ -75,7 +76,13 @@ void Run(const CLI::App& command, const ExportFlags& flags) {
   if (flags.problem.empty() == flags.rock_sample.empty()) {
     throw InputError("export", "give either --problem or --rock-sample", "see feeler export --help");
   }
-  if (!flags.rock_sample.empty()) return Write(flags, RockSampleText(flags));
+  if (!flags.rock_sample.empty()) {
+    for (const char* option : {"--discount", "--upper-bound", "--missed-contact", "--false-stop", "--slip",
+                               "--confidence", "--wrong-cost"}) {
+      if (command.count(option) > 0) throw InputError(option, "does not go with --rock-sample", "leave it out");
+    }
+    return Write(flags, RockSampleText(flags));
+  }
   planner::LatticeProblemData data = policies::ReadLatticeProblem(flags.problem);
   const planner::Noise noise = flags.noise.Over(command, data.noise);
   flags.noise.RequireNoise(command, noise);

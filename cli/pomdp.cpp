@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <memory>
 
 #include "feeler/cli/common/console.h"
@@ -36,8 +37,9 @@ PomdpSolverKind KindOf(const CLI::App& command, const SolverFlags& solver, const
 
 planner::PomdpSolverOptions Options(const CLI::App& command, const PomdpFlags& flags, const SolverFlags& solver,
                                     const planner::Pomdp& pomdp) {
-  for (const char* option : {"--gap", "--heuristic", "--setting", "--task", "--problem", "--extents", "--goal",
-                             "--cost", "--missed-contact", "--false-stop", "--slip", "--confidence", "--wrong-cost"}) {
+  for (const char* option :
+       {"--gap", "--heuristic", "--setting", "--task", "--problem", "--extents", "--goal", "--cost", "--missed-contact",
+        "--false-stop", "--slip", "--confidence", "--wrong-cost", "--opening", "--prior", "--jobs"}) {
     if (command.count(option) > 0) throw InputError(option, "does not go with --pomdp", "see feeler solve --help");
   }
   planner::PomdpSolverOptions options;
@@ -63,6 +65,13 @@ planner::PomdpSolverOptions Options(const CLI::App& command, const PomdpFlags& f
   return options;
 }
 
+void RequirePolicyExtension(const std::string& out) {
+  for (const char* extension : {".json", ".alpha", ".policyx"}) {
+    if (out.empty() || out.ends_with(extension)) return;
+  }
+  throw InputError("--out", fmt::format("unknown extension of \"{}\"", out), "give a .json, .alpha or .policyx file");
+}
+
 bool EndsIn(const std::string& path, const char* extension) { return path.ends_with(extension); }
 
 void WritePomdpPolicy(const planner::Pomdp& pomdp, const planner::PomdpResult& result, const std::string& path) {
@@ -78,13 +87,16 @@ void WritePomdpPolicy(const planner::Pomdp& pomdp, const planner::PomdpResult& r
 }
 
 nlohmann::json SimulationJson(const planner::SimulationResult& s) {
-  return {{"episodes", s.episodes}, {"mean", s.mean},       {"half_width", s.half_width},
+  return {{"episodes", s.episodes}, {"mean", s.mean},       {"half_width", NumberOrNull(s.half_width)},
           {"steps", s.steps_mean},  {"at_goal", s.at_goal}, {"cut_short", s.cut_short}};
 }
 
 void PrintSimulation(const planner::SimulationResult& s) {
-  Print("episodes       {}\nmean reward    {:.6g} +- {:.2g} (95 %)\nsteps          {:.1f}\nat a goal      {}\n",
-        s.episodes, s.mean, s.half_width, s.steps_mean, s.at_goal);
+  // Neither what is left out of episodes that were cut short nor one episode has an interval.
+  const bool interval = s.cut_short == 0 && std::isfinite(s.half_width);
+  Print("episodes       {}\nmean reward    {:.6g}{}\nsteps          {:.1f}\nat a goal      {}\n", s.episodes, s.mean,
+        interval ? fmt::format(" +- {:.2g} (95 %)", s.half_width) : "", s.steps_mean, s.at_goal);
+  if (s.cut_short > 0) Print("cut short      {}: the mean is of what they earned until then\n", s.cut_short);
 }
 
 std::string Extension(const std::string& path) {
@@ -168,6 +180,7 @@ void RequireNoPomdpFlags(const CLI::App& command) {
 void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const SolverFlags& solver, const std::string& out,
                    bool json, Session& session) {
   RequireOutputs({{"--out", out, FileKind::kPomdpPolicy}}, {flags.pomdp, flags.experience});
+  RequirePolicyExtension(out);
   const planner::Pomdp pomdp = planner::ReadPomdp(flags.pomdp);
   planner::PomdpSolverOptions options = Options(command, flags, solver, pomdp);
   options.cancellation = session.cancellation;

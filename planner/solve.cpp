@@ -131,6 +131,7 @@ std::string_view ToString(SolverStatus status) {
     case SolverStatus::kCancelled: return "cancelled";
     case SolverStatus::kUnlocalizable: return "unlocalizable";
     case SolverStatus::kMemoryLimit: return "memory_limit";
+    case SolverStatus::kRounding: return "rounding";
   }
   return "?";
 }

@@ -10,8 +10,18 @@
 
 namespace feeler::planner {
 
-enum class SolverStatus { kConverged, kGap, kTimeLimit, kExpansionLimit, kCancelled, kUnlocalizable, kMemoryLimit };
-/// "converged", "gap", "time_limit", "expansion_limit", "cancelled", "unlocalizable", "memory_limit".
+enum class SolverStatus {
+  kConverged,
+  kGap,
+  kTimeLimit,
+  kExpansionLimit,
+  kCancelled,
+  kUnlocalizable,
+  kMemoryLimit,
+  kRounding
+};
+/// "converged", "gap", "time_limit", "expansion_limit", "cancelled", "unlocalizable", "memory_limit", "rounding" (the
+/// bounds of a general POMDP are as close as its numbers allow).
 std::string_view ToString(SolverStatus status);
 
 struct SolverResult {

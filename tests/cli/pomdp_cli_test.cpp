@@ -50,9 +50,37 @@ TEST(PomdpCommands, WhatDoesNotFitIsNamed) {
   ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--precision", "1"}), "--precision");
   ExpectOneError(RunFeeler({"export", "--rock-sample", "banana"}), "banana");
   ExpectOneError(RunFeeler({"export", "--rock-sample", "60x30"}), "states");
+  ExpectOneError(RunFeeler({"export", "--rock-sample", "-3x2"}), "give size and rocks");
+  for (const std::string option : {"--discount", "--upper-bound", "--missed-contact"}) {
+    ExpectOneError(RunFeeler({"export", "--rock-sample", "3x2", option, option == "--missed-contact" ? "0.1" : "0.9"}),
+                   option);
+  }
+  ExpectOneError(RunFeeler({"solve", "--pomdp", model, "--opening", "open"}), "--opening");
+  ExpectOneError(RunFeeler({"solve", "--pomdp", model, "--jobs", "2"}), "--jobs");
+  ExpectOneError(RunFeeler({"solve", "--pomdp", model, "--prior", policy}), "--prior");
+  ExpectOneError(RunFeeler({"solve", "--pomdp", model, "--out", folder + "/policy.txt"}), "policy.txt");
   ExpectOneError(RunFeeler({"policy", "simulate", "--pomdp", model, "--policy", policy + "x"}), "policy.jsonx");
   ExpectOneError(RunFeeler({"policy", "simulate", "--pomdp", model, "--policy", policy, "--episodes", "0"}),
                  "--episodes");
+}
+
+TEST(PomdpCommands, SimulateSaysWhatWasCutShort) {
+  const std::string folder = ScratchFolder("pomdp-cut");
+  const std::string model = folder + "/rocks.pomdp";
+  const std::string policy = folder + "/policy.json";
+  ASSERT_EQ(RunFeeler({"export", "--rock-sample", "2x1", "--out", model}).exit_code, 0);
+  ASSERT_EQ(RunFeeler({"solve", "--pomdp", model, "--out", policy}).exit_code, 0);
+  const std::vector<std::string> simulate = {"policy", "simulate", "--pomdp", model, "--policy", policy, "--episodes"};
+  const auto with = [&](std::vector<std::string> more) {
+    std::vector<std::string> all = simulate;
+    all.insert(all.end(), more.begin(), more.end());
+    return RunFeeler(all).out;
+  };
+  EXPECT_NE(with({"50"}).find("(95 %)"), std::string::npos);
+  EXPECT_EQ(with({"50"}).find("cut short"), std::string::npos);
+  EXPECT_NE(with({"50", "--max-steps", "1"}).find("cut short      "), std::string::npos);
+  EXPECT_EQ(with({"50", "--max-steps", "1"}).find("(95 %)"), std::string::npos);
+  EXPECT_EQ(with({"1"}).find("+-"), std::string::npos);
 }
 
 }  // namespace

@@ -77,27 +77,47 @@ std::vector<ClassOutcome> Outcomes(const Pomdp& pomdp, std::size_t a, const std:
   return outcomes;
 }
 
-}  // namespace
-
-ObservableClasses FindObservableClasses(const Pomdp& pomdp) {
-  const std::size_t count = pomdp.state_count();
-  UnionFind sets(count);
-  std::vector<std::uint8_t> reached(count, 0);
+/// Joins until nothing changes. False if stopped.
+bool JoinAll(const Pomdp& pomdp, const std::vector<std::uint32_t>& root, UnionFind& sets,
+             std::vector<std::vector<std::uint32_t>>& groups, const std::function<bool()>& stop) {
+  std::vector<std::uint8_t> reached(pomdp.state_count(), 0);
   std::vector<std::uint32_t> first(pomdp.observation_count(), kNone);
-  std::vector<std::uint32_t> root;
-  for (const SparseEntry& s : pomdp.start) root.push_back(s.index);
   JoinSuccessors(pomdp, root, sets, reached, first);
-  std::vector<std::vector<std::uint32_t>> groups(count);
   for (bool changed = true; changed;) {
     changed = false;
     for (auto& group : groups) group.clear();
-    for (std::uint32_t s = 0; s < count; ++s) {
+    for (std::uint32_t s = 0; s < reached.size(); ++s) {
       if (reached[s] != 0) groups[sets.Find(s)].push_back(s);
     }
     for (const auto& group : groups) {
       if (!group.empty() && JoinSuccessors(pomdp, group, sets, reached, first)) changed = true;
+      if (!group.empty() && stop && stop()) return false;
     }
   }
+  return true;
+}
+
+}  // namespace
+
+double OutcomeBytes(const Pomdp& pomdp) {
+  double steps = 0.0;
+  for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
+    for (std::size_t s = 0; s < pomdp.state_count(); ++s) {
+      for (const SparseEntry& next : pomdp.transitions.Row(pomdp.At(a, s))) {
+        steps += static_cast<double>(pomdp.observation_rows.Row(pomdp.At(a, next.index)).size());
+      }
+    }
+  }
+  return steps * sizeof(ClassOutcome::Step);
+}
+
+std::optional<ObservableClasses> FindObservableClasses(const Pomdp& pomdp, const std::function<bool()>& stop) {
+  const std::size_t count = pomdp.state_count();
+  UnionFind sets(count);
+  std::vector<std::uint32_t> root;
+  for (const SparseEntry& s : pomdp.start) root.push_back(s.index);
+  std::vector<std::vector<std::uint32_t>> groups(count);
+  if (!JoinAll(pomdp, root, sets, groups, stop)) return std::nullopt;
 
   ObservableClasses found;
   std::vector<std::uint32_t> class_of(count, kNone);
@@ -127,6 +147,7 @@ ObservableClasses FindObservableClasses(const Pomdp& pomdp) {
   for (ObservableClasses::Class& c : found.classes) {
     for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
       c.outcomes.push_back(Outcomes(pomdp, a, c.states, class_of, position));
+      if (stop && stop()) return std::nullopt;
     }
   }
   return found;

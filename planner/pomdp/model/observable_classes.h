@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "feeler/planner/pomdp/model/pomdp.h"
@@ -32,6 +34,10 @@ struct ObservableClasses {
   std::vector<SparseEntry> start;  ///< the initial belief, by position in its class
 };
 
-ObservableClasses FindObservableClasses(const Pomdp& pomdp);
+/// Nothing if `stop` (asked now and then, may be empty) cuts it short.
+std::optional<ObservableClasses> FindObservableClasses(const Pomdp& pomdp, const std::function<bool()>& stop = {});
+
+/// What the outcomes of all classes will take.
+double OutcomeBytes(const Pomdp& pomdp);
 
 }  // namespace feeler::planner

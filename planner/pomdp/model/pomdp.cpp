@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "feeler/core/error.h"
 
@@ -42,6 +43,45 @@ std::vector<std::uint8_t> AbsorbingStates(const Pomdp& pomdp) {
     }
   }
   return absorbing;
+}
+
+std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<bool()>& stop) {
+  const std::size_t count = pomdp.state_count();
+  const std::size_t rows = pomdp.transitions.size();
+  std::vector<std::size_t> begin(count + 1, 0);  // of the rows that lead to a state
+  for (const SparseEntry& next : pomdp.transitions.entries) ++begin[next.index + 1];
+  for (std::size_t s = 0; s < count; ++s) begin[s + 1] += begin[s];
+  std::vector<std::size_t> leading(begin[count]);
+  std::vector<std::size_t> at(begin.begin(), begin.end() - 1);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (const SparseEntry& next : pomdp.transitions.Row(row)) leading[at[next.index]++] = row;
+  }
+  const std::vector<std::uint8_t> ends = AbsorbingStates(pomdp);
+  // Keeps the states from which some action stays among the kept ones and may come nearer: the goal for certain.
+  std::vector<std::uint8_t> kept(count, 1);
+  std::vector<std::uint32_t> open;
+  for (bool changed = true; changed;) {
+    if (stop && stop()) return std::vector<std::uint8_t>(count, 1);
+    std::vector<std::uint8_t> near = ends;
+    for (std::uint32_t s = 0; s < count; ++s) {
+      if (near[s] != 0) open.push_back(s);
+    }
+    while (!open.empty()) {
+      const std::uint32_t to = open.back();
+      open.pop_back();
+      for (std::size_t k = begin[to]; k < begin[to + 1]; ++k) {
+        const auto s = static_cast<std::uint32_t>(leading[k] % count);
+        if (near[s] != 0 || kept[s] == 0) continue;
+        const auto row = pomdp.transitions.Row(leading[k]);
+        if (!std::ranges::all_of(row, [&](const SparseEntry& n) { return kept[n.index] != 0; })) continue;
+        near[s] = 1;
+        open.push_back(s);
+      }
+    }
+    changed = near != kept;
+    kept = std::move(near);
+  }
+  return kept;
 }
 
 std::vector<std::uint32_t> ReachableStates(const Pomdp& pomdp) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,6 +56,10 @@ void RequireFits(const std::string& where, double states, double actions, double
 
 /// States that no action leaves and no action earns or costs anything in.
 std::vector<std::uint8_t> AbsorbingStates(const Pomdp& pomdp);
+
+/// The states from which a policy that sees the state comes to an absorbing one for certain. All, if `stop` (asked now
+/// and then) cuts it short.
+std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<bool()>& stop);
 
 /// The states that can be met from the initial belief, ascending.
 std::vector<std::uint32_t> ReachableStates(const Pomdp& pomdp);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "feeler/planner/pomdp/model/belief_update.h"
 
@@ -9,6 +10,7 @@ namespace feeler::planner {
 namespace {
 
 constexpr int kUndiscountedSteps = 100000;
+constexpr double kDiscountedSteps = 1e6;
 
 std::uint32_t Draw(std::span<const SparseEntry> row, RandomStream& random) {
   double at = random.Uniform();
@@ -19,9 +21,16 @@ std::uint32_t Draw(std::span<const SparseEntry> row, RandomStream& random) {
   return row.back().index;
 }
 
-int StepsThatMatter(const Pomdp& pomdp) {
+/// Infinitely many without discount.
+double StepsThatMatter(const Pomdp& pomdp) {
+  if (pomdp.discount == 1.0) return std::numeric_limits<double>::infinity();
+  return std::ceil(std::log(1e-6 * (1.0 - pomdp.discount)) / std::log(pomdp.discount));
+}
+
+int LongestEpisode(const Pomdp& pomdp, int max_steps) {
+  if (max_steps > 0) return max_steps;
   if (pomdp.discount == 1.0) return kUndiscountedSteps;
-  return static_cast<int>(std::ceil(std::log(1e-6 * (1.0 - pomdp.discount)) / std::log(pomdp.discount)));
+  return static_cast<int>(std::min(StepsThatMatter(pomdp), kDiscountedSteps));
 }
 
 }  // namespace
@@ -37,7 +46,8 @@ void BeliefAgent::Observe(std::uint32_t action, std::uint32_t observation) {
 
 SimulationResult SimulatePomdp(const Pomdp& pomdp, PomdpAgent& agent, const SimulationOptions& options) {
   const std::vector<std::uint8_t> absorbing = AbsorbingStates(pomdp);
-  const int longest = options.max_steps > 0 ? options.max_steps : StepsThatMatter(pomdp);
+  const int longest = LongestEpisode(pomdp, options.max_steps);
+  const bool cuts = longest < StepsThatMatter(pomdp);
   SimulationResult result;
   double squares = 0.0;
   double steps = 0.0;
@@ -58,18 +68,17 @@ SimulationResult SimulatePomdp(const Pomdp& pomdp, PomdpAgent& agent, const Simu
       agent.Observe(action, Draw(pomdp.observation_rows.Row(pomdp.At(action, state)), random));
     }
     result.at_goal += absorbing[state] != 0 ? 1 : 0;
-    result.cut_short += absorbing[state] == 0 && (options.max_steps > 0 || pomdp.discount == 1.0) ? 1 : 0;
+    result.cut_short += absorbing[state] == 0 && cuts ? 1 : 0;
     ++result.episodes;
     steps += step;
     const double delta = sum - result.mean;  // Welford
     result.mean += delta / result.episodes;
     squares += delta * (sum - result.mean);
   }
-  if (result.episodes > 1) {
-    constexpr double kNormal95 = 1.959964;
-    result.half_width = kNormal95 * std::sqrt(squares / (result.episodes - 1) / result.episodes);
-    result.steps_mean = steps / result.episodes;
-  }
+  constexpr double kNormal95 = 1.959964;
+  result.half_width = result.episodes > 1 ? kNormal95 * std::sqrt(squares / (result.episodes - 1) / result.episodes)
+                                          : std::numeric_limits<double>::infinity();
+  if (result.episodes > 0) result.steps_mean = steps / result.episodes;
   if (options.progress) options.progress(options.episodes, options.episodes);
   return result;
 }

@@ -54,7 +54,8 @@ class BeliefAgent : public PomdpAgent {
 struct SimulationOptions {
   int episodes = 10000;
   std::uint64_t seed = 1;
-  /// Steps of an episode at most; 0: until a goal or until the discount leaves less than 1e-6 of the greatest reward.
+  /// Steps of an episode at most; 0: until a goal or until the discount leaves less than 1e-6 of the greatest reward, a
+  /// million where that would be more, 100000 without discount.
   int max_steps = 0;
   const CancellationToken* cancellation = nullptr;
   ProgressCallback progress = {};
@@ -63,10 +64,10 @@ struct SimulationOptions {
 struct SimulationResult {
   int episodes = 0;
   double mean = 0.0;        ///< of the discounted sum of rewards
-  double half_width = 0.0;  ///< of the 95 % interval of the mean (normal)
+  double half_width = 0.0;  ///< of the 95 % interval of the mean (normal); infinite of one episode
   double steps_mean = 0.0;
   int at_goal = 0;    ///< episodes that ended in an absorbing state
-  int cut_short = 0;  ///< episodes that max_steps ended
+  int cut_short = 0;  ///< episodes that the limit of steps ended before what was to come stopped mattering
 };
 
 /// Episodes from the initial belief. Episode k draws from its own streams (seed, k): the same alone or among many.

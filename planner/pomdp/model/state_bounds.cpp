@@ -80,6 +80,7 @@ class Sweeper {
     std::vector<std::uint32_t> seen;
     sums_.assign(pomdp_.observation_count() * q.size(), 0.0);
     for (std::size_t s = 0; s < pomdp_.state_count(); ++s) {
+      if (options_.stop && options_.stop()) return kNoBound;  // a sweep may take long; the bounds hold
       for (std::size_t a = 0; a < q.size(); ++a) {
         seen.clear();
         for (const SparseEntry& next : pomdp_.transitions.Row(pomdp_.At(a, s))) {

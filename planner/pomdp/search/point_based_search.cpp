@@ -11,6 +11,9 @@ namespace {
 /// Trials close this share of the gap at the start, so that early ones stay short.
 constexpr double kTrialShare = 0.9;
 constexpr std::size_t kLongestTrial = 2000;
+/// Trials in a row that change nothing before the search gives up: what a belief has not looked at yet may still
+/// differ.
+constexpr int kIdleTrials = 100;
 /// Outcomes less likely than this are left to rounding: they change no value by more than it.
 constexpr double kImpossible = 1e-14;
 /// Beliefs that agree to so many parts are the same up to rounding of the arithmetic.
@@ -67,6 +70,7 @@ std::uint32_t PointBasedSearch::Intern(std::uint32_t class_index, std::vector<Sp
     if (node.class_index == class_index && Same(node.belief, belief)) return it->second;
   }
   const auto number = static_cast<std::uint32_t>(nodes_.size());
+  ++changes_;
   node_bytes_ += sizeof(Node) + 64 + belief.size() * sizeof(SparseEntry);
   nodes_.push_back({class_index, std::move(belief), {}, {}, {}, {}});
   index_.emplace(hash, number);
@@ -172,8 +176,9 @@ std::size_t PointBasedSearch::Update(std::uint32_t number) {
   std::size_t chosen = greatest();
   for (; refreshed_[chosen] == 0; chosen = greatest()) refresh(chosen);
   Bound& bound = nodes_[number].bound;
-  if (q_upper_[chosen] < bound.upper - 1e-10 * scale_) {
+  if (q_upper_[chosen] < bound.upper - least_change_) {
     bound.upper = q_upper_[chosen];
+    ++changes_;
     uppers_[nodes_[number].class_index].Add(number, nodes_[number].belief, bound.upper);
   }
 
@@ -189,7 +194,7 @@ std::size_t PointBasedSearch::Update(std::uint32_t number) {
     best = lower;
     best_action = a;
   }
-  if (best > bound.lower + 1e-10 * scale_) AddAlpha(number, best_action);
+  if (best > bound.lower + least_change_) AddAlpha(number, best_action);
   return chosen;
 }
 
@@ -215,8 +220,9 @@ void PointBasedSearch::AddAlpha(std::uint32_t number, std::size_t action) {
   }
   double value = 0.0;
   for (const SparseEntry& s : node.belief) value += s.value * values[s.index];
-  if (value <= node.bound.lower + 1e-10 * scale_) return;
+  if (value <= node.bound.lower + least_change_) return;
   const std::uint32_t added = alphas_[node.class_index].Add(std::move(vector));
+  ++changes_;
   node.bound.lower = value;
   node.bound.alphas.best = added;
 }
@@ -247,9 +253,13 @@ std::uint32_t PointBasedSearch::WidestSuccessor(std::uint32_t number, std::size_
 
 std::optional<SolverStatus> PointBasedSearch::Run(
     double precision, const std::function<std::optional<SolverStatus>(std::int64_t)>& stop) {
+  // Where rewards are large, what matters may be less than a usual part of them.
+  least_change_ = scale_ * std::clamp(1e-2 * precision / scale_, 1e-14, 1e-10);
   std::vector<std::uint32_t> trial;
+  int idle = 0;
   while (upper() - lower() > precision) {
     ++trials_;
+    const std::int64_t changes = changes_;
     trial.clear();
     double width = std::max(precision, kTrialShare * (upper() - lower()));
     std::uint32_t node = 0;
@@ -266,6 +276,8 @@ std::optional<SolverStatus> PointBasedSearch::Run(
       Update(trial.back());
     }
     Prune();
+    idle = changes_ == changes ? idle + 1 : 0;
+    if (idle == kIdleTrials) return SolverStatus::kRounding;
   }
   return std::nullopt;
 }

@@ -41,7 +41,8 @@ class PointBasedSearch {
   /// Everything must outlive the search. The discount must be below 1.
   PointBasedSearch(const Pomdp& pomdp, const ObservableClasses& classes, const StateBounds& bounds);
 
-  /// Until U - L <= precision at the start, or `stop(expansions)` says why not to go on.
+  /// Until U - L <= precision at the start, or `stop(expansions)` says why not to go on. kRounding: trials change
+  /// nothing any more.
   std::optional<SolverStatus> Run(double precision,
                                   const std::function<std::optional<SolverStatus>(std::int64_t)>& stop);
 
@@ -108,6 +109,8 @@ class PointBasedSearch {
   std::vector<double> q_upper_;
   std::vector<std::uint8_t> refreshed_;
   double scale_ = 1.0;
+  double least_change_ = 0.0;  ///< changes of bounds below this are left out
+  std::int64_t changes_ = 0;   ///< of bounds, and beliefs met
   std::int64_t trials_ = 0, expansions_ = 0;
   std::size_t node_bytes_ = 0;
 };

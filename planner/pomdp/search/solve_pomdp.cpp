@@ -63,7 +63,8 @@ class Attempt {
         start_(std::chrono::steady_clock::now()),
         cpu_start_s_(ThreadCpuSeconds()),
         states_(ReachableStates(whole)),
-        pomdp_(Restrict(whole, states_)) {
+        restricted_(states_.size() < whole.state_count() ? Restrict(whole, states_) : Pomdp()),
+        pomdp_(states_.size() < whole.state_count() ? restricted_ : whole) {
     for (const double r : pomdp_.reward) least_reward_ = std::min(least_reward_, r);
   }
 
@@ -98,6 +99,13 @@ class Attempt {
     return std::nullopt;
   }
 
+  /// Stop() of what comes before the search: a search that may not begin at all is of less use than one that is late by
+  /// a little.
+  bool Late() const {
+    const auto why = Stop(0);
+    return why && (why != SolverStatus::kTimeLimit || Wall() >= options_.time_limit_s + 2.0);
+  }
+
   void Row(bool now) {
     if (!options_.on_bounds) return;
     const double wall = Wall();
@@ -109,27 +117,7 @@ class Attempt {
   /// Without discount: from each state some way must lead to a goal, or no policy has a finite value.
   void RequireReachableGoal() const {
     if (pomdp_.discount < 1.0) return;
-    std::vector<std::uint8_t> ends = AbsorbingStates(pomdp_);
-    // Keeps the states from which some action stays among the kept ones and may come nearer: the goal for certain.
-    std::vector<std::uint8_t> kept(ends.size(), 1);
-    for (bool changed = true; changed;) {
-      changed = false;
-      std::vector<std::uint8_t> near = ends;
-      for (bool grew = true; grew;) {
-        grew = false;
-        for (std::size_t s = 0; s < near.size(); ++s) {
-          if (near[s] != 0 || kept[s] == 0) continue;
-          for (std::size_t a = 0; a < pomdp_.action_count() && near[s] == 0; ++a) {
-            const auto row = pomdp_.transitions.Row(pomdp_.At(a, s));
-            const bool stays = std::ranges::all_of(row, [&](const SparseEntry& n) { return kept[n.index] != 0; });
-            const bool nearer = std::ranges::any_of(row, [&](const SparseEntry& n) { return near[n.index] != 0; });
-            if (stays && nearer) near[s] = 1, grew = true;
-          }
-        }
-      }
-      changed = near != kept;
-      kept = near;
-    }
+    const std::vector<std::uint8_t> kept = SurelyEnding(pomdp_, [this] { return Stop(0).has_value(); });
     for (const SparseEntry& s : pomdp_.start) {
       if (kept[s.index] != 0) continue;
       throw NegativeResult(
@@ -137,8 +125,22 @@ class Attempt {
     }
   }
 
+  /// Where the search cannot begin: the state bounds, and the best of the policies that always do the same.
+  void BlindAlone(SolverStatus status) {
+    result_.status = status;
+    const std::uint32_t action = result_.controller->nodes[0].action;
+    FullAlphaVector full{action, {}, least_reward_ / (1.0 - pomdp_.discount)};
+    for (std::uint32_t s = 0; s < states_.size(); ++s) full.values.push_back({states_[s], bounds_.blind[action][s]});
+    result_.alphas.push_back(std::move(full));
+  }
+
   void PointBased() {
-    const ObservableClasses classes = FindObservableClasses(pomdp_);
+    if (OutcomeBytes(pomdp_) > static_cast<double>(options_.memory_limit_bytes)) {
+      return BlindAlone(SolverStatus::kMemoryLimit);
+    }
+    const auto found = FindObservableClasses(pomdp_, [this] { return Late(); });
+    if (!found) return BlindAlone(Stop(0).value_or(SolverStatus::kTimeLimit));
+    const ObservableClasses& classes = *found;
     result_.classes = classes.classes.size();
     PointBasedSearch search(pomdp_, classes, bounds_);
     const auto account = [&] {
@@ -373,7 +375,8 @@ class Attempt {
   std::chrono::steady_clock::time_point start_;
   double cpu_start_s_ = 0.0;
   std::vector<std::uint32_t> states_;  ///< of the whole model
-  Pomdp pomdp_;                        ///< what can be met of it
+  Pomdp restricted_;                   ///< empty where all can be met
+  const Pomdp& pomdp_;                 ///< what can be met of it
   double least_reward_ = 0.0;
   StateBounds bounds_;
   PomdpResult result_;

@@ -13,11 +13,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/files/alpha_file.h"
 #include "feeler/planner/pomdp/model/rock_sample.h"
+#include "feeler/planner/pomdp/model/simulate.h"
 #include "feeler/planner/pomdp/model/state_bounds.h"
 #include "tests/planner/pomdp/small_models.h"
 
@@ -354,11 +356,86 @@ TEST(SolvePomdp, LimitsStopIt) {
   const PomdpResult result = SolvePomdp(pomdp, options);
   EXPECT_EQ(result.status, SolverStatus::kMemoryLimit);
   EXPECT_LE(result.value_lower, result.value_upper);
+  // Too little for the outcomes of the classes: what needs no search is left.
+  options.memory_limit_bytes = 1 << 10;
+  const PomdpResult none = SolvePomdp(pomdp, options);
+  EXPECT_EQ(none.status, SolverStatus::kMemoryLimit);
+  ASSERT_TRUE(none.controller);
+  ASSERT_FALSE(none.alphas.empty());
+  EXPECT_GE(EvaluateController(pomdp, *none.controller)->value, none.value_lower - 1e-9);
   CancellationToken token;
   token.Cancel();
   options = {};
   options.cancellation = &token;
   EXPECT_EQ(SolvePomdp(pomdp, options).status, SolverStatus::kCancelled);
+}
+
+TEST(SolvePomdp, LargeRewardsEndTheSearch) {
+  // The tiger with other rewards: what a search leaves out as rounding must not be what the precision asks for.
+  const auto tiger = [](const std::string& bad, const std::string& listen) {
+    std::string text = kTiger;
+    for (std::size_t at = text.find("-100\n"); at != std::string::npos; at = text.find("-100\n", at)) {
+      text.replace(at, 4, bad);
+      at += bad.size();
+    }
+    return ParseCassandraPomdp(text.replace(text.find("* -1\n") + 2, 2, listen), "tiger");
+  };
+  for (const std::string bad : {"-1e6", "-1e8", "-1e12"}) {
+    const PomdpResult result = Solve(tiger(bad, "-1"), PomdpSolverKind::kPointBased);
+    EXPECT_TRUE(result.status == SolverStatus::kConverged || result.status == SolverStatus::kRounding);
+    EXPECT_GE(result.value_upper, result.value_lower);
+  }
+}
+
+TEST(SolvePomdp, StopsAreAskedWithinASweep) {
+  const Pomdp pomdp = MakeRockSample(DrawRockSample(3, 3, 4));
+  std::size_t asked = 0;
+  StateBoundsOptions options;
+  options.sweeps = 1;
+  options.stop = [&] { return ++asked, false; };
+  const double whole = BestRow(ComputeStateBounds(pomdp, options).informed, pomdp.start);
+  EXPECT_GE(asked, pomdp.state_count());
+  options.stop = [] { return true; };
+  EXPECT_GE(BestRow(ComputeStateBounds(pomdp, options).informed, pomdp.start), whole);
+}
+
+TEST(SolvePomdp, LongChainsToAGoal) {
+  constexpr int kLength = 20000;
+  std::string text = "discount: 1\nvalues: cost\nstates: " + std::to_string(kLength) +
+                     "\nactions: 1\nobservations: 1\nstart: 0\nO: * uniform\n";
+  for (int s = 0; s < kLength; ++s) {
+    const int next = std::min(s + 1, kLength - 1);
+    text += "T: 0 : " + std::to_string(s) + " : " + std::to_string(next) + " 1\n";
+    if (s + 1 < kLength) text += "R: 0 : " + std::to_string(s) + " : * : * 1\n";
+  }
+  const Pomdp chain = ParseCassandraPomdp(text, "chain");
+  const std::vector<std::uint8_t> ending = SurelyEnding(chain, {});
+  EXPECT_EQ(std::ranges::count(ending, 1), kLength);
+  const auto value = EvaluateController(chain, {{{0, {}, 0}}, 0});
+  ASSERT_TRUE(value);
+  EXPECT_NEAR(value->value, 1.0 - kLength, 1e-6);
+}
+
+TEST(SimulatePomdp, EpisodesThatAreCutShortAreCounted) {
+  Pomdp tiger = ParseCassandraPomdp(kTiger, "tiger");
+  const PomdpController listen{{{0, {}, 0}}, 0};
+  ControllerAgent agent(listen);
+  SimulationOptions options;
+  options.episodes = 1;
+  const SimulationResult whole = SimulatePomdp(tiger, agent, options);
+  EXPECT_EQ(whole.cut_short, 0);
+  EXPECT_NEAR(whole.mean, -20.0, 1e-4);
+  EXPECT_GT(whole.steps_mean, 300.0);
+  EXPECT_FALSE(std::isfinite(whole.half_width));
+  options.max_steps = 1000;  // more than matter
+  EXPECT_EQ(SimulatePomdp(tiger, agent, options).cut_short, 0);
+  options.max_steps = 10;
+  EXPECT_EQ(SimulatePomdp(tiger, agent, options).cut_short, 1);
+  tiger.discount = 0.99999999;
+  options.max_steps = 0;
+  const SimulationResult long_run = SimulatePomdp(tiger, agent, options);
+  EXPECT_EQ(long_run.cut_short, 1);
+  EXPECT_GE(long_run.steps_mean, 1e6);
 }
 
 }  // namespace
