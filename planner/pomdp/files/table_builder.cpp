@@ -63,6 +63,8 @@ std::uint64_t RewardStatements::Key(std::uint32_t a, std::uint32_t s, std::uint3
 void RewardStatements::Set(std::uint32_t action, std::uint32_t from, std::uint32_t to, std::uint32_t observation,
                            double value) {
   statements_[Key(action, from, to, observation)] = {value, ++order_};
+  const unsigned detail = (to == kAny ? 0U : 1U) | (observation == kAny ? 0U : 2U);
+  if (detail != 0) detail_[Key(action, from, kAny, kAny)] |= detail;
   const auto given = [](std::uint32_t index, unsigned bit) { return index == kAny ? 0U : 1U << bit; };
   patterns_[given(action, 0) | given(from, 1) | given(to, 2) | given(observation, 3)] = true;
 }
@@ -78,24 +80,31 @@ double RewardStatements::Find(std::uint32_t a, std::uint32_t s, std::uint32_t ne
   return last.value;
 }
 
+unsigned RewardStatements::Detail(std::uint32_t a, std::uint32_t s) const {
+  unsigned detail = 0;
+  if (detail_.empty()) return detail;
+  for (const std::uint32_t action : {a, kAny}) {
+    for (const std::uint32_t state : {s, kAny}) {
+      const auto found = detail_.find(Key(action, state, kAny, kAny));
+      if (found != detail_.end()) detail |= found->second;
+    }
+  }
+  return detail;
+}
+
 std::vector<double> RewardStatements::Expected(const SparseRows& transitions,
                                                const SparseRows& observation_rows) const {
-  bool by_next = false;
-  bool by_observation = false;
-  for (unsigned pattern = 0; pattern < 16; ++pattern) {
-    by_next = by_next || (patterns_[pattern] && (pattern & 4U) != 0);
-    by_observation = by_observation || (patterns_[pattern] && (pattern & 8U) != 0);
-  }
   std::vector<double> expected(actions_ * states_, 0.0);
   for (std::uint32_t a = 0; a < actions_; ++a) {
     for (std::uint32_t s = 0; s < states_; ++s) {
       double& sum = expected[a * states_ + s];
-      if (!by_next && !by_observation) {
+      const unsigned detail = Detail(a, s);
+      if (detail == 0) {
         sum = Find(a, s, 0, 0);
         continue;
       }
       for (const SparseEntry& next : transitions.Row(a * states_ + s)) {
-        if (!by_observation) {
+        if ((detail & 2U) == 0) {
           sum += next.value * Find(a, s, next.index, 0);
           continue;
         }

@@ -57,11 +57,14 @@ class RewardStatements {
     std::uint64_t order = 0;
   };
   std::uint64_t Key(std::uint32_t a, std::uint32_t s, std::uint32_t next, std::uint32_t o) const;
+  /// Whether statements that may hold for a and s name s' (bit 0) or o (bit 1).
+  unsigned Detail(std::uint32_t a, std::uint32_t s) const;
   double Find(std::uint32_t a, std::uint32_t s, std::uint32_t next, std::uint32_t o) const;
 
   std::size_t actions_, states_, observations_;
   std::unordered_map<std::uint64_t, Statement> statements_;
-  bool patterns_[16] = {};  ///< bit 0: a given, 1: s, 2: s', 3: o
+  std::unordered_map<std::uint64_t, unsigned> detail_;  ///< by a and s
+  bool patterns_[16] = {};                              ///< bit 0: a given, 1: s, 2: s', 3: o
   std::uint64_t order_ = 0;
 };
 

@@ -71,16 +71,14 @@ class GoalSystem {
     steps_ = values_;
   }
 
-  bool Solve(const std::function<bool()>& stop) {
+  void Solve(const std::function<bool()>& stop) {
     for (int sweep = 0; sweep < kGoalSweeps; ++sweep) {
-      if (Sweep()) return true;
-      if (stop && stop()) return false;
+      if (Sweep() || (stop && stop())) return;
       if (sweep == kSweepsBeforeLu && states_.size() <= kMostForLu) return Direct();
     }
-    return false;
   }
 
-  /// Adds what the residuals may amount to.
+  /// Adds what the residuals may amount to. False where the sweeps have not come far enough to say.
   bool Bound(std::vector<double>& costs) const {
     double residual = 0.0;
     double residual_steps = 0.0;
@@ -121,7 +119,7 @@ class GoalSystem {
     return change <= kGoalPrecision;
   }
 
-  bool Direct() {
+  void Direct() {
     const auto size = static_cast<Eigen::Index>(states_.size());
     std::vector<Eigen::Triplet<double>> entries;
     Eigen::MatrixXd right(size, 2);
@@ -135,14 +133,13 @@ class GoalSystem {
     Eigen::SparseMatrix<double> matrix(size, size);
     matrix.setFromTriplets(entries.begin(), entries.end());
     Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
-    if (lu.info() != Eigen::Success) return false;
+    if (lu.info() != Eigen::Success) return;
     Eigen::MatrixXd solution = lu.solve(right);
     solution += lu.solve(right - matrix * solution);
     for (Eigen::Index i = 0; i < size; ++i) {
       values_[static_cast<std::size_t>(i)] = solution(i, 0);
       steps_[static_cast<std::size_t>(i)] = solution(i, 1);
     }
-    return true;
   }
 
   std::vector<std::uint32_t> states_;
@@ -163,7 +160,8 @@ std::optional<std::vector<double>> GoalCosts(const GoalChain& chain, const std::
     if (lost[i] != 0) costs[i] = std::numeric_limits<double>::infinity();
   }
   GoalSystem system(chain, lost);
-  if (!system.Solve(stop) || !system.Bound(costs)) return std::nullopt;
+  system.Solve(stop);
+  if (!system.Bound(costs)) return std::nullopt;
   return costs;
 }
 

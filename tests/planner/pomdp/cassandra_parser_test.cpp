@@ -104,6 +104,15 @@ TEST(CassandraParser, WithoutObservationsTheStateIsObserved) {
   EXPECT_EQ(AsMap(p.observation_rows.Row(1)), (Row{{1, 1.0}}));
 }
 
+TEST(CassandraParser, OneRewardInDetailCostsLittle) {
+  // 1000 x 1000 x 500 rewards, if all were asked for one by one.
+  const std::string head = "discount: 0.9\nvalues: reward\nstates: 1000\nactions: 1\nobservations: 500\n";
+  const Pomdp p = Parse(head + "T: * uniform\nO: * uniform\nR: 0 : 1 : * : * 3\nR: 0 : 2 : 5 : 7 500000\n");
+  EXPECT_EQ(p.reward[1], 3.0);
+  EXPECT_NEAR(p.reward[2], 1.0, 1e-12);
+  EXPECT_EQ(p.reward[3], 0.0);
+}
+
 TEST(CassandraParser, RewardsOfAnMdp) {
   const std::string head = "discount: 0.9\nvalues: reward\nstates: 2\nactions: 2\nT: * uniform\n";
   const Pomdp p = Parse(head + "R: 0 : 0 : 0 1\nR: 0 : 0 : 1 2\nR: 0 : 1 : * 4\nR: 1 : 0\n6 8\nR: 1 : 1 : * : * 9\n");
