@@ -197,7 +197,7 @@ class Attempt {
     result_.value_lower = std::max(result_.value_lower, worth_);
   }
 
-  double GiveUp() const { return Wall() + std::max(1.0, 0.05 * Wall()); }
+  double GiveUp() const { return Wall() + std::max(2.0, 0.1 * Wall()); }
 
   /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
   /// on blindly, as it does where it is cut short for being too large. Nothing where that would not reach a goal.

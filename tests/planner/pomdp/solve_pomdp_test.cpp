@@ -285,6 +285,11 @@ TEST(SolvePomdp, TheLowerValueIsThatOfTheController) {
   const auto cut = EvaluateController(pomdp, *best.controller, [] { return true; });
   ASSERT_TRUE(cut);
   EXPECT_LE(cut->value, best.value_lower + 1e-9);
+  EXPECT_GE(cut->value, -1e3);
+  // Rewards alone: each sweep is below the value as it is.
+  Pomdp gains = pomdp;
+  for (double& reward : gains.reward) reward = std::max(0.0, reward);
+  EXPECT_GE(EvaluateController(gains, *best.controller, [] { return true; })->value, 0.0);
 }
 
 TEST(SolvePomdp, DeadEndsOfBeliefs) {
