@@ -14,19 +14,25 @@ A driver has these members; poses are 4x4 numpy arrays base_T_tool, SI units:
   compliant(poses, speed, force, time, stiffness, rotational_stiffness)          }
 
 Nothing moves before hello and start, nor after a frame that is not sound, a number out of sequence or a silent link; a
-motion under way is brought to rest. `serve` handles one session after the other.
+motion under way is brought to rest. A driver that raises is answered as `fault`, with the robot at rest: nothing moves
+in that session any more. `serve` handles one session after the other; who knocks meanwhile is told `busy`.
 """
 import hmac
 import json
 import os
+import queue
 import select
 import socket
+import sys
+import threading
 import time
 
 import numpy as np
 
 VERSION, UNITS = 1, "m kg s rad N"
 BEAT_S, LINK_TIMEOUT_S, MOST_BYTES = 0.02, 0.1, 1 << 18
+# As execution/remote/robot_server.h: what no robot is asked for, and from where on a straight way is not watched.
+MOST_STIFFNESS, MOST_ROTATIONAL_STIFFNESS, NOT_WATCHED_N = 1e5, 1e4, 1e5
 MOTIONS = ("transfer", "linear", "guarded", "compliant")
 
 
@@ -73,12 +79,47 @@ class SessionOver(Exception):
     pass
 
 
+class DriverFault(Exception):
+    """What a driver raised, so that it is told from a frame that is not sound."""
+
+
+class Guarded:
+    """A driver whose exceptions are faults of the robot; those of a generator, too."""
+
+    def __init__(self, driver):
+        self._driver = driver
+
+    def __getattr__(self, name):
+        member = getattr(self._driver, name)
+        if not callable(member):
+            return member
+
+        def call(*arguments):
+            try:
+                result = member(*arguments)
+            except Exception as error:
+                raise DriverFault(f"{name}: {type(error).__name__}: {error}") from error
+            return self._motion(name, result) if name in MOTIONS else result
+
+        return call
+
+    @staticmethod
+    def _motion(name, motion):
+        try:
+            return (yield from motion)
+        except GeneratorExit:
+            raise
+        except Exception as error:
+            raise DriverFault(f"{name}: {type(error).__name__}: {error}") from error
+
+
 class Server:
     """`validator(name, message)` raises ValueError where a message is not as `$defs/name` of the schema says."""
 
     def __init__(self, driver, token="", validator=None):
-        self.driver, self.token, self.validator = driver, token, validator or schema_validator()
+        self.driver, self.token, self.validator = Guarded(driver), token, validator or schema_validator()
         self.motions = 0
+        self.free = threading.Lock()  # held during a session
 
     # ---- the wire
     def _send(self, message):
@@ -86,6 +127,8 @@ class Server:
             self.connection.sendall(json.dumps(message, allow_nan=False).encode() + b"\n")
         except OSError as error:
             raise SessionOver(str(error)) from error
+        except ValueError as error:
+            raise DriverFault("tells a number that is not finite") from error
 
     def _receive(self, wait_s):
         """The next frame, or None."""
@@ -141,29 +184,67 @@ class Server:
 
     # ---- sessions
     def serve(self, listener, sessions=None):
+        """Sessions in the thread that calls; another one tells who knocks meanwhile that the robot is busy."""
+        waiting = queue.SimpleQueue()
+
+        def knock():
+            while True:
+                try:
+                    connection, _ = listener.accept()
+                except OSError as error:
+                    return waiting.put(error)
+                if self.free.acquire(timeout=0.05):  # a session may be about to end
+                    waiting.put(connection)
+                else:
+                    self._turn_away(connection)
+
+        threading.Thread(target=knock, daemon=True).start()
         while sessions is None or sessions > 0:
-            connection, _ = listener.accept()
-            self.session(connection)
+            connection = waiting.get()
+            if isinstance(connection, OSError):
+                raise connection
+            try:
+                self.session(connection)
+            finally:
+                self.free.release()
             if sessions is not None:
                 sessions -= 1
 
+    @staticmethod
+    def _turn_away(connection):
+        busy = {"type": "error", "seq": 0, "code": "busy", "text": "another session is under way"}
+        try:
+            connection.settimeout(0.1)
+            connection.sendall(json.dumps(busy).encode() + b"\n")
+            connection.shutdown(socket.SHUT_WR)
+            while connection.recv(65536):  # closing with bytes unread would lose the last words
+                pass
+        except OSError:
+            pass
+        connection.close()
+
     def session(self, connection):
         self.connection, self.buffer, self.mode, self.seq = connection, b"", "waiting", 0
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.heard = self.told = time.monotonic()
         try:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if self._greet():
                 while self._serve_one():
                     pass
-        except SessionOver:
+        except (SessionOver, OSError):
             pass
+        except DriverFault as fault:
+            self._last_words("fault", fault)
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            try:
-                self._error(self.seq, "malformed", str(error))
-            except SessionOver:
-                pass
+            self._last_words("malformed", error)
         finally:
             connection.close()
+
+    def _last_words(self, code, error):
+        try:
+            self._error(self.seq, code, str(error))
+        except SessionOver:
+            pass
 
     def _greet(self):
         frame = self._receive(2.0)
@@ -187,8 +268,11 @@ class Server:
     def _serve_one(self):
         frame = self._receive(BEAT_S / 2)
         self._beat()
-        if frame is None or frame["type"] == "heartbeat":
+        if frame is None or (frame["type"] == "heartbeat" and frame["seq"] == 0):
             return True
+        if frame["type"] in ("heartbeat", "hello"):
+            self._error(frame["seq"], "sequence", "a heartbeat has the number 0, and a session one hello")
+            return False
         if frame["seq"] != self.seq + 1:
             self._error(frame["seq"], "sequence", f"number {frame['seq']} where {self.seq + 1} is due")
             return False
@@ -202,7 +286,11 @@ class Server:
         if kind == "start" and self.mode == "waiting":
             self.mode = "ready"
         elif kind == "recover" and self.mode == "protective_stop":
-            self.driver.recover()
+            try:
+                self.driver.recover()
+            except DriverFault as fault:
+                self._error(self.seq, "refused", str(fault))
+                return True
             self.mode = "ready"
         elif kind == "zero":
             self.driver.zero()
@@ -226,8 +314,12 @@ class Server:
         c = self.driver.capabilities
         if frame.get("speed_m_s", 0.0) > c["max_speed_m_s"] * (1 + 1e-9):
             return "outside of the limits of the robot: speed"
-        if frame.get("force_limit_n", 0.0) > c["max_force_n"]:
+        force = frame.get("force_limit_n", frame.get("contact_force_n", 0.0))
+        if force > c["max_force_n"] and not (kind == "linear" and force >= NOT_WATCHED_N):
             return "outside of the limits of the robot: force"
+        if kind == "compliant" and (max(frame["stiffness_n_m"]) > MOST_STIFFNESS or
+                                    frame["rotational_stiffness_nm_rad"] > MOST_ROTATIONAL_STIFFNESS):
+            return "outside of the limits of the robot: stiffness"
         if kind == "guarded":
             places = [self.driver.pose()[:3, 3] + frame["distance_m"] * np.array(frame["direction"])]
         else:

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Laws of the Python bridges, over loopback, against doubles of ur_rtde and rclpy: a guarded motion ends at the block;
 nothing moves before the start, after a wrong token, version, unit or number, after garbage, or when the link is silent;
-a stop and a lost link end a motion under way; what both ends send is what the schema says."""
+a stop and a lost link end a motion under way; a driver that raises is a fault, and the next session is served; a second
+client is told busy at once; what both ends send is what the schema says."""
 import json
 import os
 import socket
@@ -84,7 +85,11 @@ class Bridges:
         self.listener.close()
 
     def client(self):
+        """A session of its own, as soon as the one before is over."""
+        end = time.monotonic() + 5.0
         client = Client(self.port, "secret")
+        while client.welcome.get("code") == "busy" and time.monotonic() < end:
+            client = Client(self.port, "secret")
         self.assertEqual(client.welcome["type"], "welcome")
         return client
 
@@ -111,6 +116,11 @@ class Bridges:
         client.ask("start")
         self.assertEqual(client.ask("guarded", **client.down(speed=9.0))["code"], "refused")
         self.assertEqual(client.ask("guarded", **client.down(distance=9.0))["code"], "refused")
+        self.assertEqual(client.ask("guarded", **{**client.down(), "contact_force_n": 1e9})["code"], "refused")
+        stiff = dict(poses=[IDENTITY], speed_m_s=0.2, force_limit_n=40.0, time_limit_s=20.0)
+        for stiffness, rotational in (([1000, 1000, 1e6], 200.0), ([1000, 1000, 4000], 1e6)):
+            refused = client.ask("compliant", stiffness_n_m=stiffness, rotational_stiffness_nm_rad=rotational, **stiff)
+            self.assertEqual(refused["code"], "refused")
         self.assertEqual(self.server.motions, 0)
 
     def test_wrong_token_version_and_units_are_told(self):
@@ -131,6 +141,13 @@ class Bridges:
         client = self.client()
         client.ask("start")
         self.assertEqual(client.ask("guarded", seq=5, **client.down())["code"], "sequence")
+        for line in (b'{"type":"heartbeat","seq":77}\n', json.dumps(dict(
+                type="hello", seq=2, version=1, units=feeler_robot.UNITS, client="test", token="secret")).encode() + b"\n"):
+            client = self.client()
+            client.ask("start")
+            client.socket.sendall(line)
+            self.assertEqual(client.read()["code"], "sequence", line)
+            self.assertIsNone(client.ask("guarded", **client.down()))
         self.assertEqual(self.server.motions, 0)
 
     def test_a_stop_and_a_lost_link_end_a_motion(self):
@@ -151,12 +168,49 @@ class Bridges:
         self.assertEqual(self.driver.pose()[0, 3], before)
         self.assertGreater(before, 0.0)
 
+    def test_a_driver_that_raises_is_a_fault_and_the_next_session_is_served(self):
+        wrench, calls = self.driver.wrench, []
+
+        def lost_after_a_while():
+            calls.append(1)
+            if len(calls) > 20:
+                raise RuntimeError("the driver is gone")
+            return wrench()
+
+        client = self.client()
+        client.ask("start")
+        self.driver.wrench = lost_after_a_while
+        client.send("linear", pose=[1, 0, 0, -1.0, 0, 1, 0, 0.0, 0, 0, 1, 0.2], speed_m_s=0.05, contact_force_n=6.0)
+        told = client.read()
+        self.assertEqual((told["type"], told["code"]), ("error", "fault"), told)
+        self.assertIn("the driver is gone", told["text"])
+        self.driver.wrench = wrench
+        time.sleep(0.15)
+        before = self.driver.pose()[0, 3]
+        time.sleep(0.1)
+        self.assertEqual(self.driver.pose()[0, 3], before)
+        client = self.client()
+        self.assertEqual(client.ask("guarded", **client.down())["code"], "refused")
+        client.ask("start")
+        self.assertEqual(client.ask("guarded", **client.down(distance=0.01))["type"], "result")
+
+    def test_a_second_client_is_told_busy_at_once(self):
+        client = self.client()
+        client.ask("start")
+        client.send("linear", pose=[1, 0, 0, 0.4, 0, 1, 0, 0.0, 0, 0, 1, 0.2], speed_m_s=0.1, contact_force_n=6.0)
+        began = time.monotonic()
+        self.assertEqual(Client(self.port, "secret").welcome["code"], "busy")
+        self.assertLess(time.monotonic() - began, 0.8)
+        self.assertEqual(client.read()["type"], "result")
+        self.assertEqual(client.ask("state")["type"], "state")
+
     def test_a_protective_stop_asks_for_recovery(self):
         client = self.client()
         client.ask("start")
         self.world.protective = True
         time.sleep(0.05)
         self.assertEqual(client.ask("guarded", **client.down())["code"], "refused")
+        self.assertEqual(client.ask("recover")["code"], "refused")  # and the session goes on
         self.world.protective = False
         time.sleep(0.05)
         self.assertEqual(client.ask("guarded", **client.down())["code"], "refused")
