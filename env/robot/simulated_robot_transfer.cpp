@@ -8,7 +8,7 @@
 
 namespace feeler::env {
 
-std::vector<Eigen::VectorXd> SimulatedRobot::PlanWay(const Pose& world_T_tool, std::string& reason) {
+std::vector<Eigen::VectorXd> SimulatedRobot::PlanWay(const Pose& world_T_tool, std::string& reason, bool& interrupted) {
   const JointVector start = q_rad();
   if (options_.transfer_planner) {
     const std::vector<JointVector> way = options_.transfer_planner(world_, start, world_T_tool);
@@ -20,8 +20,17 @@ std::vector<Eigen::VectorXd> SimulatedRobot::PlanWay(const Pose& world_T_tool, s
   transfer_checker_->SetTargetPoses(memory_.target_candidates);
   TransferSettings settings = options_.transfer;
   settings.seed = memory_.transfer_seed;
+  int checks = 0;
+  std::string why;
+  settings.search.stop = [&] {
+    constexpr int kChecksPerQuestion = 32;
+    if (interruption_ && why.empty() && ++checks % kChecksPerQuestion == 0) why = interruption_();
+    return !why.empty();
+  };
   planner::TransferPlan plan = PlanTransfer(*transfer_checker_, scene, start, world_T_tool, settings);
-  reason = plan.reason;
+  interrupted = !why.empty();
+  reason = interrupted ? why : plan.reason;
+  if (interrupted) plan.way_points.clear();
   return plan.way_points;
 }
 
@@ -30,9 +39,10 @@ MotionResult SimulatedRobot::Transfer(const Pose& world_T_tool) {
   return Guard([&] {
     MotionResult result;
     const Scene& scene = world_.scene();
-    const std::vector<Eigen::VectorXd> way_points = PlanWay(world_T_tool, result.detail);
+    bool interrupted = false;
+    const std::vector<Eigen::VectorXd> way_points = PlanWay(world_T_tool, result.detail, interrupted);
     if (way_points.empty()) {
-      result.reason = StopReason::kUnplanned;
+      result.reason = interrupted ? StopReason::kAborted : StopReason::kUnplanned;
       result.world_T_tool = ToolPose();
       return result;
     }

@@ -116,6 +116,7 @@ planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene,
   planner::TransferOptions options = settings.search;
   options.seed = settings.seed;
   options.reach_m = checker.reach_m();
+  options.most_checks = settings.most_checks;
   // Half the spacing stays within the clearance, and so does half of it again for rounded corners.
   options.check_spacing_m = std::max(checker.clearance_m(), 0.001);
   const planner::JointBounds limits = JointLimits(scene);
@@ -142,6 +143,7 @@ planner::TransferPlan PlanTransfer(TransferChecker& checker, const Scene& scene,
     add_twins(limits);
     options.iterations_all_goals = settings.far_iterations;
     const int checks = plan.checks;
+    if (settings.most_checks > 0) options.most_checks = std::max(1, settings.most_checks - checks);
     plan = planner::TransferPlanner(limits, free, options).Plan(start_rad, goals);
     plan.checks += checks;
   }

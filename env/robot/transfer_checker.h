@@ -59,9 +59,12 @@ struct TransferSettings {
   /// configuration has twins and the search more room to get lost in. Where no way is found, the limits of the joints
   /// count.
   double joint_bound_rad = 3.14159265358979323846;
-  int far_iterations = 20000;       ///< effort of the search within the limits of the joints; 0: none
+  int far_iterations = 20000;  ///< effort of the search within the limits of the joints; 0: none
+  /// Configurations looked at, in all; a search that needs more is given up (0: no limit). What an arm over a table
+  /// ever needed is far below.
+  int most_checks = 200000;
   double twin_margin_rad = 0.0;     ///< goals a turn of some joints away stay this far within the bounds
-  planner::TransferOptions search;  ///< seed, reach_m and check_spacing_m are set from the above
+  planner::TransferOptions search;  ///< seed, reach_m, check_spacing_m and most_checks are set from the above
 };
 
 /// Plans a transfer of the arm to one of these configurations, or to the same place of all links nearest to the start,

@@ -151,7 +151,9 @@ std::vector<Eigen::VectorXd> SearchWay(const TransferPlanner& planner, const Val
   search.setNearestNeighbors<ompl::NearestNeighborsLinear>();
   search.setup();
   ob::IterationTerminationCondition limit(static_cast<unsigned>(iterations));
-  if (search.solve(limit) != ob::PlannerStatus::EXACT_SOLUTION) return {};
+  const auto& stop = planner.options().stop;
+  const ob::PlannerTerminationCondition end([&] { return limit.eval() || (stop && stop()); });
+  if (search.solve(end) != ob::PlannerStatus::EXACT_SOLUTION) return {};
 
   og::PathGeometric path(*problem->getSolutionPath()->as<og::PathGeometric>());
   SeededSimplifier simplifier(information, LocalSeed(seed, "transfer simplifier"));

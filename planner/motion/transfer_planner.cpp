@@ -70,19 +70,25 @@ TransferPlan TransferPlanner::Plan(const Eigen::VectorXd& start_rad,
   for (const Eigen::VectorXd& goal : goals_rad) sizes = sizes && goal.size() == joints;
   if (!sizes) throw InputError("transfer planner", "a configuration of another size", "one angle per joint");
 
-  // A planner of its own, so that the checks of this plan are counted.
+  // A planner of its own, so that the checks of this plan are counted. Nothing is free any more once it is to end.
+  bool ended = false;
   const ValidityFunction counted = [&](const Eigen::VectorXd& q) {
+    ended = ended || (options_.most_checks > 0 && plan.checks >= options_.most_checks) ||
+            (options_.stop && options_.stop());
+    if (ended) return false;
     ++plan.checks;
     return valid_(q);
   };
-  const TransferPlanner counting(bounds_, counted, options_);
+  TransferOptions counting_options = options_;
+  counting_options.stop = [&] { return ended; };
+  const TransferPlanner counting(bounds_, counted, counting_options);
   const auto fail = [&](TransferStatus status, const char* reason) {
     plan.status = status;
     plan.reason = reason;
     return plan;
   };
   if (!WithinBounds(start_rad)) return fail(TransferStatus::kStartInvalid, "the start is beyond the joint limits");
-  if (!counted(start_rad)) return fail(TransferStatus::kStartInvalid, "the start is not free of collision");
+  if (!counted(start_rad) && !ended) return fail(TransferStatus::kStartInvalid, "the start is not free of collision");
   if (goals_rad.empty()) return fail(TransferStatus::kNoGoal, "no configuration reaches the goal");
 
   // Goals that can be stood at, nearest first.
@@ -90,6 +96,7 @@ TransferPlan TransferPlanner::Plan(const Eigen::VectorXd& start_rad,
   for (std::size_t i = 0; i < goals_rad.size(); ++i) {
     if (WithinBounds(goals_rad[i]) && counted(goals_rad[i])) order.push_back(static_cast<int>(i));
   }
+  if (ended) return fail(TransferStatus::kStopped, "the search for a way was given up");
   if (order.empty()) return fail(TransferStatus::kNoGoal, "every configuration that reaches the goal collides");
   const auto goal_at = [&](int index) -> const Eigen::VectorXd& { return goals_rad[static_cast<std::size_t>(index)]; };
   std::stable_sort(order.begin(), order.end(),
@@ -129,6 +136,7 @@ TransferPlan TransferPlanner::Plan(const Eigen::VectorXd& start_rad,
       offer(std::move(way_points), end == order.end() ? -1 : *end);
     }
   }
+  if (found == 0 && ended) return fail(TransferStatus::kStopped, "the search for a way was given up");
   if (found == 0) return fail(TransferStatus::kNotFound, "the search found no way around the obstacles");
   plan.status = TransferStatus::kPlanned;
   plan.sweep_m = shortest;

@@ -31,6 +31,9 @@ struct TransferOptions {
   int iterations_all_goals = 1500;  ///< for all goals together, where no goal was reached in turn
   int plans_to_compare = 2;         ///< stop after this many goals were reached; the shortest plan wins
   int simplification_rounds = 4;    ///< of removing and short-cutting way points
+  int most_checks = 0;              ///< calls of the validity function after which the search ends; 0: no limit
+  /// Asked before each of them: whether the search is to end. Empty: nobody is asked. Asking changes nothing.
+  std::function<bool()> stop;
 };
 
 enum class TransferStatus {
@@ -38,6 +41,7 @@ enum class TransferStatus {
   kStartInvalid,  ///< the start is out of bounds or not free
   kNoGoal,        ///< no goal was given (out of reach), or none is within bounds and free
   kNotFound,      ///< the search ended without a way
+  kStopped,       ///< it was stopped, or had made its most checks
 };
 
 struct TransferPlan {
@@ -52,7 +56,7 @@ struct TransferPlan {
 
 /// Motions through free joint space: the straight motion where it is free, else RRT-Connect (Kuffner and LaValle 2000,
 /// as implemented in OMPL) to one of several goal configurations, then short-cut. It stops on iterations, never on
-/// time, and draws from generators of its own only.
+/// time (but by `TransferOptions::stop`), and draws from generators of its own only.
 ///
 /// Laws: plan.way_points.front() = start, back() = one of the goals; every configuration at a sweep of at most
 /// check_spacing_m along the plan is within bounds and valid; the sweep of the plan is at least that of the straight

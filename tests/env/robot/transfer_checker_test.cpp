@@ -7,11 +7,14 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <memory>
 #include <numbers>
+#include <string>
 
 #include "feeler/core/error.h"
 #include "feeler/core/random.h"
 #include "feeler/env/gym/insertion_env.h"
+#include "feeler/env/robot/simulated_robot.h"
 #include "feeler/planner/motion/time_parametrization.h"
 
 namespace feeler::env {
@@ -201,6 +204,27 @@ TEST(Transfer, ReportsWhatCannotBe) {
   EXPECT_NE(checker.Collision(start), "");
   EXPECT_EQ(checker.Collision(scene.home_q_rad), "");
   EXPECT_THROW(TransferChecker(scene, 0.1), InputError);
+}
+
+/// Free, and cut off by the table above it.
+Pose BelowTheTable() { return MakePose(Eigen::Vector3d(0.65, 0.0, -0.4), Eigen::Quaterniond::Identity()); }
+
+TEST(Transfer, ASearchThatWouldGoOnIsGivenUpOrStopped) {
+  RobotOptions options;
+  options.transfer.most_checks = 3000;
+  SimulatedRobot robot(std::make_shared<const Scene>(PlugScene()), options);
+  const MotionResult given_up = robot.Transfer(BelowTheTable());
+  EXPECT_EQ(given_up.reason, StopReason::kUnplanned);
+  EXPECT_NE(given_up.detail.find("given up"), std::string::npos) << given_up.detail;
+  int asked = 0;
+  robot.SetInterruption([&] { return std::string(++asked > 5 ? "stopped by order" : ""); });
+  const MotionResult stopped = robot.Transfer(BelowTheTable());
+  EXPECT_EQ(stopped.reason, StopReason::kAborted);
+  EXPECT_EQ(stopped.detail, "stopped by order");
+  EXPECT_EQ(asked, 6) << "asked while it plans, and no more then";
+  EXPECT_EQ(robot.Time(), 0.0) << "nothing moved";
+  robot.SetInterruption({});
+  EXPECT_EQ(robot.Transfer(NominalStartPose(PlugScene())).reason, StopReason::kReached);
 }
 
 // No point of the robot moves farther than the sweep says: the law the spacing of checks rests on.

@@ -87,6 +87,21 @@ TEST(TransferPlanner, TakesTheGoalThatCanBeReached) {
   EXPECT_EQ(plan.goal, 2);
 }
 
+TEST(TransferPlanner, EndsWhenItIsStoppedOrHasLookedLongEnough) {
+  TransferOptions options = Options(3);
+  options.iterations_all_goals = 1'000'000;  // for ever
+  options.most_checks = 5000;
+  const TransferPlan given_up = TransferPlanner(Box(3), ClosedWall, options).Plan(Point(3, -1), {Point(3, 1)});
+  EXPECT_EQ(given_up.status, TransferStatus::kStopped);
+  EXPECT_EQ(given_up.checks, options.most_checks);
+  options.most_checks = 0;
+  int asked = 0;
+  options.stop = [&] { return ++asked > 300; };
+  const TransferPlan stopped = TransferPlanner(Box(3), ClosedWall, options).Plan(Point(3, -1), {Point(3, 1)});
+  EXPECT_EQ(stopped.status, TransferStatus::kStopped);
+  EXPECT_EQ(stopped.checks, 300);
+}
+
 TEST(TransferPlanner, ReportsWhatCannotBePlanned) {
   TransferOptions options = Options(3);
   options.iterations_all_goals = 500;
