@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/execution/remote/token_file.h"
 
 namespace feeler::execution {
 namespace {
@@ -40,34 +41,67 @@ bool Within(const Eigen::Vector3d& p, const Capabilities& c) {
          (p.array() <= c.workspace_max_m.array() + kMargin_m).all();
 }
 
-/// Why a motion is outside of what the robot states; empty if it is not.
-std::string OutsideOf(const Capabilities& c, const Request& request, const Eigen::Vector3d& here) {
+/// What a motion asks for.
+struct Demand {
   double speed_m_s = 0.0;
   double force_n = 0.0;
+  double rate_rad_s = 0.0;
+  double stiffness_n_m = 0.0;
+  double rotational_stiffness_nm_rad = 0.0;
   std::vector<Eigen::Vector3d> places;
+};
+
+Demand DemandOf(const Request& request, const Pose& here) {
+  Demand d;
+  const auto watched = [](double force_n) { return force_n >= kNotWatched_n ? 0.0 : force_n; };
   if (const auto* transfer = std::get_if<TransferRequest>(&request)) {
-    places = {transfer->world_T_tool.translation()};
+    d.places = {transfer->world_T_tool.translation()};
   } else if (const auto* linear = std::get_if<LinearRequest>(&request)) {
-    places = {linear->world_T_tool.translation()};
-    speed_m_s = linear->speed_m_s;
+    d.places = {linear->world_T_tool.translation()};
+    d.speed_m_s = linear->speed_m_s;
+    d.force_n = watched(linear->contact_force_n);
   } else if (const auto* guarded = std::get_if<GuardedMotion>(&request)) {
-    places = {here + guarded->distance_m * guarded->direction};
-    speed_m_s = guarded->speed_m_s;
+    d.places = {here.translation() + guarded->distance_m * guarded->direction};
+    d.speed_m_s = guarded->speed_m_s;
+    d.force_n = guarded->contact_force_n;
   } else if (const auto* compliant = std::get_if<CompliantMotion>(&request)) {
-    for (const Pose& pose : compliant->world_T_tool) places.emplace_back(pose.translation());
-    speed_m_s = compliant->speed_m_s;
-    force_n = compliant->force_limit_n;
+    for (const Pose& pose : compliant->world_T_tool) d.places.emplace_back(pose.translation());
+    d.speed_m_s = compliant->speed_m_s;
+    d.force_n = compliant->force_limit_n;
+    d.stiffness_n_m = compliant->stiffness_n_m.maxCoeff();
+    d.rotational_stiffness_nm_rad = compliant->rotational_stiffness_nm_rad;
   } else if (const auto* twist = std::get_if<TwistMotion>(&request)) {
-    speed_m_s = twist->linear_m_s.norm();
+    d.rate_rad_s = twist->angular_rad_s.norm();
+    d.speed_m_s = twist->linear_m_s.norm() + twist->tool_T_frame.translation().norm() * d.rate_rad_s;
+    d.force_n = watched(twist->contact_force_n);
+    const Eigen::Vector3d way_m = twist->duration_s * (twist->tool_T_frame.linear() * twist->linear_m_s);
+    if (d.rate_rad_s == 0.0) d.places = {here * way_m};
   }
+  return d;
+}
+
+/// Why a motion is outside of what the robot states; empty if it is not.
+std::string OutsideOf(const Capabilities& c, const Request& request, const Pose& here) {
+  const Demand d = DemandOf(request, here);
+  struct Limit {
+    const char* what;
+    const char* unit;
+    double asked;
+    double most;
+  };
+  const Limit limits[] = {
+      {"speed", "m/s", d.speed_m_s, c.max_speed_m_s},
+      {"force", "N", d.force_n, c.max_force_n},
+      {"turning rate", "rad/s", d.rate_rad_s, kMostRate_rad_s},
+      {"stiffness", "N/m", d.stiffness_n_m, kMostStiffness_n_m},
+      {"rotational stiffness", "Nm/rad", d.rotational_stiffness_nm_rad, kMostRotationalStiffness_nm_rad}};
   constexpr double kRounding = 1.0 + 1e-9;
-  if (speed_m_s > c.max_speed_m_s * kRounding) {
-    return fmt::format("the speed of {:g} m/s is above {:g}", speed_m_s, c.max_speed_m_s);
+  for (const Limit& limit : limits) {
+    if (!(limit.asked <= limit.most * kRounding)) {
+      return fmt::format("the {} of {:g} {} is above {:g}", limit.what, limit.asked, limit.unit, limit.most);
+    }
   }
-  if (force_n > c.max_force_n * kRounding) {
-    return fmt::format("the force limit of {:g} N is above {:g}", force_n, c.max_force_n);
-  }
-  for (const Eigen::Vector3d& place : places) {
+  for (const Eigen::Vector3d& place : d.places) {
     if (!Within(place, c)) {
       return fmt::format("{:.3f} {:.3f} {:.3f} m is outside of the workspace", place.x(), place.y(), place.z());
     }
@@ -194,7 +228,8 @@ std::optional<SessionEnd> RobotServer::Greet(const std::string& line) {
     return Fail(0, "version", fmt::format("this robot speaks version {}", kProtocolVersion));
   }
   if (hello->units != kProtocolUnits) return Fail(0, "units", "this robot counts in " + std::string(kProtocolUnits));
-  if (!options_.token.empty() && !SameText(hello->token, options_.token)) return Fail(0, "token", "a wrong token");
+  const std::string due = form_ == WireForm::kNumbers ? AsNumber(options_.token) : options_.token;
+  if (!options_.token.empty() && !SameText(hello->token, due)) return Fail(0, "token", "a wrong token");
   greeted_ = true;
   WelcomeReply welcome;
   welcome.robot = served_.name;
@@ -220,7 +255,13 @@ std::optional<SessionEnd> RobotServer::Greet(const std::string& line) {
 
 std::optional<SessionEnd> RobotServer::Handle(const Framed<Request>& framed) {
   const Request& request = framed.body;
-  if (std::holds_alternative<HeartbeatRequest>(request)) return std::nullopt;
+  if (std::holds_alternative<HeartbeatRequest>(request)) {
+    if (framed.seq == 0) return std::nullopt;
+    return Fail(framed.seq, "sequence", "a heartbeat has the number 0");
+  }
+  if (std::holds_alternative<HelloRequest>(request)) {
+    return Fail(framed.seq, "sequence", "the session has begun: a new one takes a new connection");
+  }
   if (framed.seq != seq_ + 1) {
     return Fail(framed.seq, "sequence", fmt::format("number {} where {} is due", framed.seq, seq_ + 1));
   }
@@ -273,7 +314,7 @@ std::string RobotServer::Refusal(const Request& request) const {
   const auto& known = served_.capabilities.motions;
   const std::string name(NameOf(request));
   if (std::find(known.begin(), known.end(), name) == known.end()) return "this robot has no motion '" + name + "'";
-  const std::string outside = OutsideOf(served_.capabilities, request, served_.robot.ToolPose().translation());
+  const std::string outside = OutsideOf(served_.capabilities, request, served_.robot.ToolPose());
   return outside.empty() ? "" : "outside of the limits of the robot: " + outside;
 }
 
@@ -357,7 +398,7 @@ void RobotServer::PumpWhileMoving() {
     try {
       if (status == LineStatus::kTooLong) throw InputError("frame", "too long", "send less");
       const Framed<Request> framed = DecodeRequest(form_, line);
-      if (std::holds_alternative<HeartbeatRequest>(framed.body)) continue;
+      if (std::holds_alternative<HeartbeatRequest>(framed.body) && framed.seq == 0) continue;
       if (!std::holds_alternative<StopRequest>(framed.body)) throw InputError("frame", "one at a time", "wait");
       stop_ = "stopped by order";
       waiting_.push_back(line);  // it is answered when its turn has come

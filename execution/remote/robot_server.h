@@ -18,6 +18,13 @@
 
 namespace feeler::execution {
 
+/// What no served robot is asked for, whatever it is: stiffness and turning rate of its tool (docs/robot-protocol.md).
+inline constexpr double kMostStiffness_n_m = 1e5;
+inline constexpr double kMostRotationalStiffness_nm_rad = 1e4;
+inline constexpr double kMostRate_rad_s = 3.2;
+/// A `linear` or `twist` with a contact force from here on is not watched: a retreat begins in contact.
+inline constexpr double kNotWatched_n = 1e5;
+
 /// A robot to be served, and what `feeler::Robot` has no word for; functions may be empty.
 struct ServedRobot {
   Robot& robot;

@@ -27,4 +27,22 @@ std::string ReadTokenFile(const std::string& path) {
   return token;
 }
 
+void RequireNumbersToken(const std::string& token) {
+  constexpr std::size_t kMostDigits = 9;
+  if (token.empty()) return;
+  if (token.size() > kMostDigits || token.find_first_not_of("0123456789") != std::string::npos) {
+    throw InputError("--token-file", "the numbers-only form carries one to nine digits",
+                     "choose such a token at both ends");
+  }
+  if (token.front() == '0') {
+    throw InputError("--token-file", "the token begins with a zero, which the numbers-only form loses",
+                     "choose one that begins with 1 to 9, at both ends");
+  }
+}
+
+std::string AsNumber(const std::string& token) {
+  if (token.empty() || token.find_first_not_of("0123456789") != std::string::npos) return token;
+  return token.substr(std::min(token.find_first_not_of('0'), token.size() - 1));
+}
+
 }  // namespace feeler::execution
