@@ -100,6 +100,7 @@ std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path) {
         throw InputError(fmt::format("{} line {}", path, number), "is no JSON, or nested too deep",
                          "run the episode again");
       }
+      if (record.value("dry", false)) continue;  // nothing moved
       rows.push_back(SummaryRow(record));
     } catch (const nlohmann::json::exception& e) {
       throw InputError(path + " line " + std::to_string(number), std::string("not an episode record: ") + e.what(),

@@ -31,7 +31,7 @@ EpisodeSummaryRow SummaryRow(const workflow::EpisodeRecord& record);
 /// Of a record as it stands in a file. Throws nlohmann::json::exception for another object.
 EpisodeSummaryRow SummaryRow(const nlohmann::json& record);
 
-/// Reads a records file. Throws InputError naming file and line for a line that is no record.
+/// Reads a records file, dry runs left out. Throws InputError naming file and line for a line that is no record.
 std::vector<EpisodeSummaryRow> ReadRecords(const std::string& path);
 
 }  // namespace feeler::evaluation

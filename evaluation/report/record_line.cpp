@@ -1,7 +1,9 @@
 #include "feeler/evaluation/report/record_line.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 
 #include "feeler/core/json_depth.h"
 
@@ -90,6 +92,13 @@ json PackedMoves(const json& record) {
   return packed;
 }
 
+/// "2026-11-29T17:40:12Z"
+bool IsTime(const std::string& text) {
+  constexpr std::string_view kForm = "dddd-dd-ddTdd:dd:ddZ";
+  return std::equal(text.begin(), text.end(), kForm.begin(), kForm.end(),
+                    [](char c, char form) { return form == 'd' ? c >= '0' && c <= '9' : c == form; });
+}
+
 /// What the judge said; on a robot, where nobody knows what is true, what the executor believes.
 bool JudgedOrBelieved(const json& record, const char* key) {
   return Member(record, key).is_null() ? Flag(Member(record, "believed"), key) : Flag(record, key);
@@ -139,6 +148,11 @@ ReportedEpisode ReadRecordLine(const std::string& line, json& record) {
   const std::int64_t episode = Whole(record, "episode");
   Whole(record, "seed");
   ReportedEpisode reported;
+  if (record.contains("started")) {
+    reported.started = Text(record, "started");
+    if (!IsTime(reported.started)) Refuse("\"started\" is no time like 2026-11-29T17:40:12Z");
+  }
+  reported.dry = record.contains("dry") && Flag(record, "dry");
   reported.inserted = JudgedOrBelieved(record, "inserted");
   reported.ladder = !List(record, "ladder").empty();
   json error_mm = nullptr;

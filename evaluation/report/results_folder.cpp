@@ -91,7 +91,8 @@ class FolderReader {
     ReportedRecords records;
     records.file = Relative(file);
     std::ifstream in(file);
-    std::map<std::int64_t, int> line_of;
+    std::map<std::pair<std::string, std::int64_t>, int> line_of;
+    int dry = 0;
     json record;
     int number = 0;
     for (std::string line; std::getline(in, line);) {
@@ -100,6 +101,10 @@ class FolderReader {
       const std::string where = records.file + " line " + std::to_string(number);
       try {
         ReportedEpisode episode = ReadRecordLine(line, record);
+        if (episode.dry) {
+          ++dry;
+          continue;
+        }
         if (records.episodes.empty()) {
           records.task = record["task"];
           records.policy = record["policy"];
@@ -109,12 +114,17 @@ class FolderReader {
                    records.noise != record["noise"] || records.seed != record["seed"]) {
           throw std::invalid_argument("is of another run than the lines before it");
         }
-        const auto [first, is_new] = line_of.emplace(record["episode"].get<std::int64_t>(), number);
+        const auto [first, is_new] =
+            line_of.emplace(std::pair(episode.started, record["episode"].get<std::int64_t>()), number);
         if (!is_new) throw std::invalid_argument("is the episode of line " + std::to_string(first->second) + " again");
         records.episodes.push_back(std::move(episode));
       } catch (const std::invalid_argument& fault) {
         Add(where, fault.what(), "remove the line, or run the episode again");
       }
+    }
+    if (dry > 0) {
+      Add(records.file, "holds " + std::to_string(dry) + " of dry runs, in which nothing moved: left out",
+          "remove them, or let them be");
     }
     if (number == 0) Add(records.file, "holds no episode", "run the episodes again, or move it away");
     if (!records.episodes.empty()) results_.records.push_back(std::move(records));

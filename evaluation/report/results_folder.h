@@ -34,9 +34,11 @@ struct ReportedEpisode {
   std::string replay;  ///< one line of JSON, or empty
   bool inserted = false;
   bool ladder = false;  ///< a fallback was used
+  std::string started;  ///< when its run began, on a robot; empty: a simulation, which seed and number tell apart
+  bool dry = false;     ///< nothing moved: no episode to report
 };
 
-/// A records file with the lines that could be read.
+/// A records file with the lines that could be read, dry runs left out.
 struct ReportedRecords {
   std::string file;  ///< relative to the results folder
   std::string task, policy, noise;

@@ -246,6 +246,35 @@ TEST(ReportTest, FaultsAreNamedAndTheRestIsReported) {
   EXPECT_EQ(results.experiments[0].rows.size(), 2U);
 }
 
+TEST(ReportTest, RunsOfARobotAreToldApartAndDryOnesLeftOut) {
+  const std::string folder = ResultsFolder("robot", 1);
+  json first = json::parse(Lines()[0]);
+  first["noise"] = "real";
+  json second = first;
+  first["started"] = "2026-11-29T17:40:12Z";
+  second["started"] = "2026-11-29T17:52:03Z";
+  json dry = first;
+  dry["dry"] = true;
+  json wrong = first;
+  wrong["started"] = "yesterday";
+  std::string text;
+  for (const json& record : {first, dry, second, second, wrong}) text += record.dump() + "\n";
+  Write(folder + "/robot.jsonl", text);
+  const Results results = ReadResults(folder);
+  const auto robot = std::find_if(results.records.begin(), results.records.end(),
+                                  [](const ReportedRecords& records) { return records.file == "robot.jsonl"; });
+  ASSERT_NE(robot, results.records.end());
+  EXPECT_EQ(robot->episodes.size(), 2U);
+  const auto told = [&](const std::string& where, const std::string& what) {
+    return std::any_of(results.faults.begin(), results.faults.end(), [&](const Fault& fault) {
+      return fault.where == where && fault.what.find(what) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(told("robot.jsonl", "1 of dry runs"));
+  EXPECT_TRUE(told("robot.jsonl line 4", "episode of line 3 again"));
+  EXPECT_TRUE(told("robot.jsonl line 5", "\"started\""));
+}
+
 TEST(ReportTest, FoldersThatHoldNothingAreRefused) {
   EXPECT_THROW(ReadResults(NewFolder("nothing")), InputError);
   EXPECT_THROW(ReadResults(NewFolder("gone") + "/gone"), InputError);
