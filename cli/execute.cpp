@@ -1,8 +1,10 @@
 // feeler execute: finds the target and the bundle where they are asked for, then becomes feeler-execute, which links no
 // simulator.
 #include <fmt/format.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <climits>
@@ -10,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "feeler/cli/commands.h"
@@ -23,6 +26,8 @@
 
 namespace feeler::cli {
 namespace {
+
+constexpr const char* kTargetGroup = "The target, in place of --estimate and --extents";
 
 struct ForwardedFlags {
   std::string task;
@@ -55,6 +60,31 @@ void EnsureBundle(const ForwardedFlags& flags) {
   workflow::KeepBundle(setup, flags.db);
 }
 
+/// Becomes feeler-execute.
+[[noreturn]] void Become(std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const std::string program = ExecuteProgram();
+  execvp(program.c_str(), argv.data());
+  throw InputError("feeler-execute", std::string("cannot be started: ") + std::strerror(errno),
+                   "install it beside feeler");
+}
+
+/// The help of feeler-execute, and of what is added here.
+void Help(const CLI::App& command) {
+  const pid_t child = fork();
+  if (child == 0) Become({"feeler execute", "--help"});
+  int status = 0;
+  while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  CLI::Formatter formatter;
+  formatter.column_width(42);
+  Print("{}", formatter.make_group(kTargetGroup, false, command.get_options([](const CLI::Option* option) {
+    return option->get_group() == kTargetGroup;
+  })));
+}
+
 void Execute(const ForwardedFlags& flags, const std::vector<std::string>& others) {
   std::vector<std::string> arguments = {"feeler execute"};
   const auto give = [&](const char* name, const std::string& value) {
@@ -70,13 +100,7 @@ void Execute(const ForwardedFlags& flags, const std::vector<std::string>& others
   }
   arguments.insert(arguments.end(), others.begin(), others.end());
   EnsureBundle(flags);
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  const std::string program = ExecuteProgram();
-  execvp(program.c_str(), argv.data());
-  throw InputError("feeler-execute", std::string("cannot be started: ") + std::strerror(errno),
-                   "install it beside feeler");
+  Become(std::move(arguments));
 }
 
 }  // namespace
@@ -89,8 +113,16 @@ void AddExecuteCommand(CLI::App& app, Session& /*session*/) {
   command->allow_extras();
   command->add_option("--task", flags->task, "the task of the database");
   command->add_option("--db", flags->db, "policy database of the task");
+  const std::size_t before = command->get_options().size();
   AddTargetSources(*command, flags->sources);
-  command->callback([flags, command] { Execute(*flags, command->remaining()); });
+  const std::vector<CLI::Option*> options = command->get_options();
+  for (std::size_t i = before; i < options.size(); ++i) options[i]->group(kTargetGroup);
+  command->callback([flags, command] {
+    const std::vector<std::string> others = command->remaining();
+    const auto asked = [&](const char* word) { return std::find(others.begin(), others.end(), word) != others.end(); };
+    if (asked("--help") || asked("-h")) return Help(*command);
+    Execute(*flags, others);
+  });
 }
 
 }  // namespace feeler::cli
