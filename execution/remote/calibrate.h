@@ -22,17 +22,19 @@ struct CalibrationSettings {
   double depth_m = 0.005;        ///< of the tool reference below the top while it touches a side
   double speed_m_s = 0.01;       ///< of touches
   double fast_speed_m_s = 0.03;  ///< of the touches that show how fast the robot reacts
-  double contact_force_n = 6.0;
-  double hard_force_n = 15.0;                    ///< of the touches that show the stiffness
-  int samples = 20;                              ///< of the sensor at rest
-  bool sides = true;                             ///< touch the four sides, too: the tool centre point across
+  double way_speed_m_s = 0.1;    ///< between touches
+  double contact_force_n = 6.0;  ///< that counts as a touch; what is pressed with for the stiffness follows
+  double most_force_n = 250.0;   ///< that the robot takes
+  int samples = 20;              ///< of the sensor at rest
+  bool sides = true;             ///< touch the four sides, too: the tool centre point across
   std::function<void(const std::string&)> tell;  ///< what is being done, for people; may be empty
 };
 
 /// Touches the block with a tool that stands above it, axes parallel to the base frame: sensor bias and noise at rest,
 /// the tool centre point (the heights at three places on top; the middles between opposite sides, where the width of
-/// the tool cancels), the stiffness of a contact (two forces, two depths) and the reaction time (two speeds, two
-/// peaks). Throws WorldError where a touch does not meet the block, or the robot refuses.
+/// the tool cancels), the stiffness of a contact (pressed by small steps: force over depth at rest) and the reaction
+/// time (two speeds, two peaks; left out where they cannot be told apart). Throws InputError for settings that measure
+/// nothing, WorldError where a touch does not meet the block, the robot refuses, or what comes out cannot be.
 CellFile Calibrate(Robot& robot, const KnownBlock& block, const CalibrationSettings& settings = {});
 
 }  // namespace feeler::execution

@@ -195,26 +195,36 @@ bool Connection::Write(std::string_view bytes, double timeout_s) {
   return true;
 }
 
-Connection Connect(const Address& address, double timeout_s) {
+Connection Connect(const Address& address, double timeout_s, const CancellationToken* cancellation) {
   const std::string where = address.host + ":" + std::to_string(address.port);
   const AddressList list = Resolve(address, false);
   if (!list) throw WorldError(where, "no such host", "check the address of the robot");
   const double end_s = MonotonicSeconds() + timeout_s;
   int error = 0;
+  constexpr double kLookAtCancellation_s = 0.1;
+  const auto cancelled = [&] { return cancellation != nullptr && cancellation->cancelled(); };
+  const auto answered = [&](int descriptor) {
+    bool ready = false;
+    while (!ready && !cancelled() && MonotonicSeconds() < end_s) {
+      ready = WaitFor(descriptor, POLLOUT, std::clamp(end_s - MonotonicSeconds(), 0.0, kLookAtCancellation_s));
+    }
+    return ready;
+  };
   do {  // a robot that is about to listen is waited for
     for (const addrinfo* at = list.get(); at != nullptr; at = at->ai_next) {
       const int descriptor = socket(at->ai_family, at->ai_socktype, at->ai_protocol);
       if (descriptor < 0) continue;
       Connection connection(descriptor);
       error = connect(descriptor, at->ai_addr, at->ai_addrlen) == 0 ? 0 : errno;
-      if (error == EINPROGRESS && WaitFor(descriptor, POLLOUT, std::max(0.0, end_s - MonotonicSeconds()))) {
+      if (error == EINPROGRESS && answered(descriptor)) {
         socklen_t size = sizeof error;
         getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &size);
       }
       if (error == 0) return connection;
     }
     usleep(20'000);
-  } while (MonotonicSeconds() < end_s);
+  } while (MonotonicSeconds() < end_s && !cancelled());
+  if (cancelled()) throw WorldError(where, "nobody answered before it was interrupted", "begin again");
   throw WorldError(where, std::string("no robot answers: ") + std::strerror(error),
                    "start it (feeler simulate --listen ADDR) or check the address");
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "feeler/core/progress.h"
+
 namespace feeler::execution {
 
 /// Longest frame that either end takes, in bytes: a picture is the longest sound one.
@@ -57,8 +59,8 @@ class Connection {
   std::size_t scanned_ = 0;  ///< no line end before this
 };
 
-/// Throws WorldError when nobody answers there.
-Connection Connect(const Address& address, double timeout_s);
+/// Throws WorldError when nobody answers there, or the wait is cancelled.
+Connection Connect(const Address& address, double timeout_s, const CancellationToken* cancellation = nullptr);
 
 class Listener {
  public:

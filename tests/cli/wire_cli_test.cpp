@@ -229,6 +229,48 @@ TEST(WireCli, AMotionThatTheArmCannotMakeIsNotSent) {
   EXPECT_NE(refused.err.find("none.urdf"), std::string::npos) << refused.err;
 }
 
+std::vector<std::string> Calibrate(const std::string& address, const std::string& out,
+                                   const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {
+      "cell",  "calibrate", "--robot",    address, "--block", "0.635,-0.012,0.1,0.665,0.012,0.2",
+      "--out", out,         "--top-only", "--json"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST(WireCli, ACalibrationFindsTheBiasOfTheSensorAndNamesItsTool) {
+  const std::string folder = ScratchFolder("wire_cell");
+  const std::string out = folder + "/cell.json";
+  for (const std::string wire : {"json", "numbers"}) {
+    Simulation simulation({"--seed", "3", "--faults", "bias=8"});
+    const CommandResult made =
+        RunFeeler(Calibrate(simulation.address(), out, {"--tool", CubeDatabase(), "--wire", wire}));
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    const OrderedJson cell = OrderedJson::parse(ReadFile(out));
+    EXPECT_NEAR(cell.at("force_bias_n").get<double>(), 8.0, 0.05) << "before any episode";
+    EXPECT_EQ(cell.at("tool"), "plug");
+    EXPECT_GT(cell.at("stiffness_n_m").get<double>(), 1e4);
+    EXPECT_LT(cell.at("stiffness_n_m").get<double>(), 5e7);
+  }
+  for (const std::string force : {"1", "20", "50"}) {
+    Simulation simulation({"--seed", "3", "--no-replay"});
+    const CommandResult made =
+        RunFeeler(Calibrate(simulation.address(), out, {"--tool", "plug", "--contact-force", force}));
+    ASSERT_EQ(made.exit_code, 0) << force << made.err;
+    EXPECT_GT(OrderedJson::parse(ReadFile(out)).at("stiffness_n_m").get<double>(), 1e4) << force;
+    const CommandResult dry = RunFeeler(Execute(simulation.address(), {"--cell", out, "--dry-run"}));
+    EXPECT_EQ(dry.exit_code, 0) << force << dry.err;
+  }
+}
+
+TEST(WireCli, TheHelpOfExecuteNamesAllOptions) {
+  const CommandResult help = RunFeeler({"execute", "--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* option : {"--db", "--estimate", "--depth", "--cloud", "--intrinsics", "--background", "--table"}) {
+    EXPECT_NE(help.out.find(option), std::string::npos) << option << help.out;
+  }
+}
+
 TEST(WireCli, BadInputIsOneLine) {
   const auto refused = [](const std::vector<std::string>& arguments, const std::string& word) {
     const CommandResult result = RunFeeler(arguments);
@@ -245,6 +287,9 @@ TEST(WireCli, BadInputIsOneLine) {
   refused(Execute(nowhere, {"--task", "round-peg"}), "--task");
   refused(Execute(nowhere, {"--cell", CubeDatabase()}), "");
   refused(Execute(nowhere, {"--token-file", "/nowhere"}), "/nowhere");
+  refused(Calibrate(nowhere, "/tmp/none.json", {"--tool", "nosuchtask"}), "nosuchtask");
+  refused(Calibrate(nowhere, "/tmp/none.json", {}), "--tool");
+  refused(Calibrate("listen:0.0.0.0:0", "/tmp/none.json", {"--tool", "plug"}), "token");
   refused({"execute", "--db", "/nowhere.db", "--robot", nowhere}, "/nowhere.db");
   refused({"simulate", "--task", "plug", "--listen", "0.0.0.0:0"}, "token");
   refused({"simulate", "--task", "plug", "--listen", "127.0.0.1:0", "--faults", "gremlins=1"}, "gremlins");
@@ -255,6 +300,11 @@ TEST(WireCli, BadInputIsOneLine) {
   chmod((folder + "/token").c_str(), 0600);
   Simulation simulation({"--seed", "3", "--token-file", folder + "/token"});
   refused(Execute(simulation.address(), {}), "token");
+  WriteFile(folder + "/zeros", "007\n");
+  chmod((folder + "/zeros").c_str(), 0600);
+  refused(
+      Calibrate(nowhere, "/tmp/none.json", {"--tool", "plug", "--wire", "numbers", "--token-file", folder + "/zeros"}),
+      "zero");
   refused(Execute(simulation.address(), {"--token-file", folder + "/token", "--extents", "3x3x3"}), "--extents");
   EXPECT_EQ(simulation.Stop().at("motions"), 0);
 }

@@ -35,10 +35,13 @@ execution::Capabilities CapabilitiesOf(const env::SimulatedRobot& robot, const E
 
 ServedEpisodes::ServedEpisodes(EpisodeRunner runner, std::int64_t episodes, bool any_extents,
                                std::function<nlohmann::json(const Replay&)> replay_json)
-    : runner_(std::move(runner)),
-      episodes_(episodes),
-      any_extents_(any_extents),
-      replay_json_(std::move(replay_json)) {}
+    : runner_(std::move(runner)), episodes_(episodes), any_extents_(any_extents), replay_json_(std::move(replay_json)) {
+  // The robot waits at home as it is, its sensor no better than in an episode.
+  env::SimulatedRobot& robot = runner_.environment().robot();
+  const env::Scene& scene = robot.world().scene();
+  robot.Reset(scene.home_q_rad, scene.task.world_T_target, runner_.faults().robot,
+              RandomStream(runner_.options().seed, 0, "before the first episode"));
+}
 
 execution::ServedRobot ServedEpisodes::Robot() {
   env::SimulatedRobot& robot = runner_.environment().robot();

@@ -16,6 +16,7 @@ namespace feeler::workflow {
 /// executor is told and what is true later are those of `EpisodeRunner::Run`, number by number. Stays where it is.
 class ServedEpisodes {
  public:
+  /// The robot stands at home, with the noise of the runner, until the first episode is asked for.
   /// `any_extents`: an executor that asks for extents gets them; else the problems are those of the runner's family.
   /// `replay_json`: how a replay is written into the verdict; empty: none is kept.
   ServedEpisodes(EpisodeRunner runner, std::int64_t episodes, bool any_extents = false,
