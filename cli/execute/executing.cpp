@@ -8,7 +8,6 @@
 #include <cctype>
 #include <ctime>
 #include <filesystem>
-#include <string_view>
 #include <utility>
 
 #include "feeler/cli/common/console.h"
@@ -30,7 +29,6 @@ using execution::ExecutorOptions;
 
 /// As feeler run: expansions a step for a problem that the database does not hold.
 constexpr std::int64_t kOutsideExpansions = 3000;
-constexpr const char* kListen = "listen:";
 constexpr double kRedial_s = 10.0;
 /// A sensor that tells contacts late may raise the force budget of the task so many times, unasked.
 constexpr double kMostRise = 2.0;
@@ -64,7 +62,9 @@ Executing::Executing(const ExecuteFlags& flags, const Session& session)
     asked_ = planner::ParseExtents(flags.extents, bundle_.task);
     planner::RequireWithinTask({{*asked_}, flags.extents}, bundle_.task);
   }
-  robot_ = Dial();
+  dialler_ = std::make_unique<execution::Dialler>("--robot", flags.robot, WayToRobot(),
+                                                  [](const std::string& text) { Note("feeler: {}\n", text); });
+  robot_ = dialler_->Dial();
   FindArm();
   if (!cell_.robot.empty() && cell_.robot != welcome().robot) {
     throw InputError(flags.cell, "is of the robot '" + cell_.robot + "', and here is '" + welcome().robot + "'",
@@ -109,7 +109,7 @@ void Executing::FindArm() {
   }
 }
 
-std::unique_ptr<execution::RemoteRobot> Executing::Dial() {
+execution::RemoteOptions Executing::WayToRobot() const {
   execution::RemoteOptions options;
   options.token = execution::ReadTokenFile(flags_.token_file);
   options.form = flags_.wire == "numbers" ? execution::WireForm::kNumbers : execution::WireForm::kJson;
@@ -117,34 +117,7 @@ std::unique_ptr<execution::RemoteRobot> Executing::Dial() {
   options.link_timeout_s = flags_.link_timeout_s;
   options.cancellation = session_.cancellation;
   options.measured = {cell_.stiffness_n_m, cell_.reaction_time_s, cell_.force_noise_n};
-  if (!flags_.robot.starts_with(kListen)) {
-    const execution::Address address = execution::ParseAddress("--robot", flags_.robot);
-    return std::make_unique<execution::RemoteRobot>(execution::Connect(address, kRedial_s), options);
-  }
-  if (!listener_) {
-    const execution::Address address =
-        execution::ParseAddress("--robot", flags_.robot.substr(std::string(kListen).size()));
-    if (!execution::IsLoopback(address) && options.token.empty()) {
-      throw InputError("--robot", "others than this machine reach " + address.host + ", and there is no token",
-                       "listen on 127.0.0.1 or give --token-file");
-    }
-    listener_ = std::make_unique<execution::Listener>("--robot", address);
-    Note("feeler: waits for the robot's program on port {}\n", listener_->port());
-  }
-  for (;;) {
-    if (session_.cancellation->cancelled()) throw WorldError("robot", "nobody dialled in", "start the robot's program");
-    constexpr double kLook_s = 0.2;
-    if (auto connection = listener_->Accept(kLook_s)) {
-      try {
-        return std::make_unique<execution::RemoteRobot>(std::move(*connection), options);
-      } catch (const WorldError& error) {
-        Note("feeler: who dialled in is turned away: {}\n", error.what());
-      } catch (const InputError& error) {
-        if (!std::string_view(error.what()).starts_with("robot message")) throw;  // a robot, but none to work with
-        Note("feeler: who dialled in is turned away: {}\n", error.what());
-      }
-    }
-  }
+  return options;
 }
 
 bool Executing::Redial() {
@@ -152,7 +125,7 @@ bool Executing::Redial() {
   const double end_s = execution::MonotonicSeconds() + kRedial_s;
   while (execution::MonotonicSeconds() < end_s && !session_.cancellation->cancelled()) {
     try {
-      robot_ = Dial();
+      robot_ = dialler_->Dial();
       if (started_) robot_->Start();
       return true;
     } catch (const Error& error) {

@@ -13,6 +13,7 @@
 #include "feeler/execution/records/episode_line.h"
 #include "feeler/execution/recovery/online_planner.h"
 #include "feeler/execution/remote/cell_file.h"
+#include "feeler/execution/remote/dialler.h"
 #include "feeler/execution/remote/remote_robot.h"
 #include "feeler/planner/family/problem_family.h"
 #include "feeler/policies/online_policy.h"
@@ -50,7 +51,7 @@ class Executing {
   void Bye() { robot_->Bye(); }
 
  private:
-  std::unique_ptr<execution::RemoteRobot> Dial();
+  execution::RemoteOptions WayToRobot() const;
   bool Redial();
   /// Asks the operator until a protective stop is recovered from. Throws NegativeResult where nobody does.
   void RecoverIfStopped();
@@ -74,7 +75,7 @@ class Executing {
   std::map<planner::Extents, std::shared_ptr<const planner::PolicyGraph>> stored_;
   std::shared_ptr<planner::PlanningTablesCache> tables_ = std::make_shared<planner::PlanningTablesCache>();
   std::shared_ptr<execution::OnlinePlanner> online_planner_ = std::make_shared<execution::OnlinePlanner>();
-  std::unique_ptr<execution::Listener> listener_;  ///< where the robot dials in
+  std::unique_ptr<execution::Dialler> dialler_;
   std::unique_ptr<execution::RemoteRobot> robot_;
   std::optional<execution::ArmCheck> arm_;
   std::optional<planner::Extents> asked_;  ///< --extents
