@@ -113,20 +113,43 @@ double Narrowest(const SlabLoop& loop) {
   return longest > 0 ? SignedArea(loop) / longest : 0;
 }
 
-std::vector<ConvexPiece> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options) {
-  std::vector<ConvexPiece> pieces;
-  for (const Slab& slab : slabs) {
-    const double tolerance_m = 0.5 * std::min(options.tolerance_near_m, options.tolerance_far_m);
-    for (const SlabLoop& polygon : ConvexPartition(slab.loops, tolerance_m)) {
-      if (Narrowest(polygon) < kSliver_m) continue;
-      std::vector<Eigen::Vector3d> corners;
-      for (const SlabPoint& p : polygon) {
-        corners.emplace_back(p.low.x(), p.low.y(), slab.low_m);
-        corners.emplace_back(p.high.x(), p.high.y(), slab.high_m);
-      }
-      if (auto piece = HullOf(corners)) pieces.push_back(std::move(*piece));
+/// One half of a slab: the lower or the upper.
+Slab HalfOf(const Slab& slab, bool upper) {
+  const double middle = 0.5 * (slab.low_m + slab.high_m);
+  Slab half{upper ? middle : slab.low_m, upper ? slab.high_m : middle, slab.loops};
+  for (SlabLoop& loop : half.loops) {
+    for (SlabPoint& p : loop) {
+      (upper ? p.low : p.high) = p.middle;
+      p.middle = 0.5 * (p.low + p.high);
     }
   }
+  return half;
+}
+
+/// The convex bodies of a slab. Where no cut stays plane from end to end, its halves are cut, and their halves.
+void CutSlab(const Slab& slab, double tolerance_m, int halvings, std::vector<ConvexPiece>& pieces) {
+  const auto polygons = ConvexPartition(slab.loops, tolerance_m, halvings > 0);
+  if (!polygons) {
+    CutSlab(HalfOf(slab, false), tolerance_m, halvings - 1, pieces);
+    CutSlab(HalfOf(slab, true), tolerance_m, halvings - 1, pieces);
+    return;
+  }
+  for (const SlabLoop& polygon : *polygons) {
+    if (Narrowest(polygon) < kSliver_m) continue;
+    std::vector<Eigen::Vector3d> corners;
+    for (const SlabPoint& p : polygon) {
+      corners.emplace_back(p.low.x(), p.low.y(), slab.low_m);
+      corners.emplace_back(p.high.x(), p.high.y(), slab.high_m);
+    }
+    if (auto piece = HullOf(corners)) pieces.push_back(std::move(*piece));
+  }
+}
+
+std::vector<ConvexPiece> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options) {
+  constexpr int kHalvings = 6;
+  const double tolerance_m = 0.5 * std::min(options.tolerance_near_m, options.tolerance_far_m);
+  std::vector<ConvexPiece> pieces;
+  for (const Slab& slab : slabs) CutSlab(slab, tolerance_m, kHalvings, pieces);
   return pieces;
 }
 

@@ -1,6 +1,7 @@
 #include "feeler/cad/section/convex_partition.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -18,6 +19,13 @@ constexpr std::size_t kMostPartners = 16;
 constexpr double kSnap = 0.02;
 /// Between a cut and a side, where there is a choice.
 constexpr double kLeastAngle = kPi / 6;
+/// A cut whose ends are off a plane by less is plane.
+constexpr double kPlane_m = 2e-7;
+/// Of the directions that a cut may take, where the bisector and the prolonged sides do not do.
+constexpr std::array kFan{1.0 / 6, 1.0 / 3, 0.5, 2.0 / 3, 5.0 / 6};
+
+using Height = Eigen::Vector2d SlabPoint::*;
+constexpr std::array<Height, 2> kEnds{&SlabPoint::low, &SlabPoint::high};
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -58,17 +66,32 @@ Corner CornerAt(const Region& region, std::size_t loop, std::size_t index) {
 }
 
 /// How far the corner stands into the polygon beyond the line between its neighbours: what is lost if it is left.
-bool IsReflex(const Corner& corner, double tolerance_m) {
+bool IsReflex(const Region& region, const Corner& corner, double tolerance_m) {
   if (corner.angle <= kPi + 1e-9) return false;
   if (corner.angle > 1.5 * kPi) return true;
-  const Eigen::Vector2d chord = corner.to_next - corner.to_previous;
-  const double length = chord.norm();
-  if (length < kTouch_m) return true;
-  return std::abs(Cross(chord, corner.to_next)) / length > tolerance_m;
+  const SlabLoop& loop = region.loops[corner.place.loop];
+  const std::size_t count = loop.size();
+  const SlabPoint& next = loop[(corner.place.index + 1) % count];
+  const SlabPoint& previous = loop[(corner.place.index + count - 1) % count];
+  const auto stands_in = [&](Height at) {
+    const Eigen::Vector2d chord = next.*at - previous.*at;
+    const double length = chord.norm();
+    if (length < kTouch_m) return at == &SlabPoint::middle;
+    return std::abs(Cross(chord, next.*at - loop[corner.place.index].*at)) / length > tolerance_m;
+  };
+  return stands_in(&SlabPoint::middle) || stands_in(&SlabPoint::low) || stands_in(&SlabPoint::high);
+}
+
+bool IsPrism(const Region& region) {
+  return std::all_of(region.loops.begin(), region.loops.end(), [](const SlabLoop& loop) {
+    return std::all_of(loop.begin(), loop.end(),
+                       [](const SlabPoint& p) { return (p.low - p.high).norm() <= kTouch_m; });
+  });
 }
 
 struct Cut {
   Place end;
+  SlabPoint point;  ///< where it ends, if within a side
   double score = std::numeric_limits<double>::infinity();
 };
 
@@ -79,13 +102,14 @@ struct Hit {
 };
 
 /// The first side that a ray through the material comes to.
-Hit Shoot(const Region& region, const Eigen::Vector2d& from, const Eigen::Vector2d& direction) {
+Hit Shoot(const Region& region, const Eigen::Vector2d& from, const Eigen::Vector2d& direction,
+          Height at = &SlabPoint::middle) {
   Hit hit;
   for (std::size_t l = 0; l < region.loops.size(); ++l) {
     const SlabLoop& loop = region.loops[l];
     for (std::size_t i = 0; i < loop.size(); ++i) {
-      const Eigen::Vector2d& a = loop[i].middle;
-      const Eigen::Vector2d side = loop[(i + 1) % loop.size()].middle - a;
+      const Eigen::Vector2d& a = loop[i].*at;
+      const Eigen::Vector2d side = loop[(i + 1) % loop.size()].*at - a;
       const double across = Cross(direction, side);
       if (across <= 0) continue;  // the ray leaves the material from a side's left to its right
       const double t = Cross(a - from, side) / across;
@@ -103,21 +127,51 @@ bool Within(const Corner& corner, const Eigen::Vector2d& direction) {
   return angle > 1e-9 && angle < corner.angle - 1e-9;
 }
 
+bool IsOn(const SlabLoop& loop, const Eigen::Vector2d& point) {
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Eigen::Vector2d& a = loop[i].middle;
+    const Eigen::Vector2d side = loop[(i + 1) % loop.size()].middle - a;
+    const double length = side.squaredNorm();
+    const double share = length > 0 ? std::clamp((point - a).dot(side) / length, 0.0, 1.0) : 0.0;
+    if ((point - a - share * side).norm() <= 2 * kTouch_m) return true;
+  }
+  return false;
+}
+
+/// Whether a hole lies in a loop; the two may have corners and sides in common, which tell nothing.
+bool Holds(const SlabLoop& around, const SlabLoop& hole) {
+  if (SignedArea(around) < -SignedArea(hole)) return false;
+  for (std::size_t i = 0; i < hole.size(); ++i) {
+    const Eigen::Vector2d& corner = hole[i].middle;
+    const Eigen::Vector2d between = 0.5 * (corner + hole[(i + 1) % hole.size()].middle);
+    for (const Eigen::Vector2d& point : {corner, between}) {
+      if (!IsOn(around, point)) return Encloses(around, point);
+    }
+  }
+  return true;
+}
+
 /// The part of the score that asks for cuts that meet sides squarely.
 double Squareness(double angle) { return std::max(std::sin(std::clamp(angle, 0.0, kPi / 2)), 1e-3); }
 
 class Cutter {
  public:
-  Cutter(Region region, double tolerance_m) : tolerance_m_(tolerance_m) { regions_.push_back(std::move(region)); }
+  Cutter(Region region, double tolerance_m, bool plane_only)
+      : tolerance_m_(tolerance_m), any_cut_does_(!plane_only || IsPrism(region)) {
+    regions_.push_back(std::move(region));
+  }
 
-  std::vector<SlabLoop> Run() {
-    std::vector<SlabLoop> done;
+  /// False when a cut would not be plane.
+  bool Run(std::vector<SlabLoop>& done) {
     while (!regions_.empty()) {
       Region region = std::move(regions_.back());
       regions_.pop_back();
-      if (!CutOnce(region)) done.push_back(std::move(region.loops.front()));
+      const bool convex = !CutOnce(region);
+      if (!convex) continue;
+      if (stuck_) return false;
+      done.push_back(std::move(region.loops.front()));
     }
-    return done;
+    return true;
   }
 
  private:
@@ -128,7 +182,7 @@ class Cutter {
       for (std::size_t i = 0; i < region.loops[l].size(); ++i) {
         const Corner corner = CornerAt(region, l, i);
         // Every hole has to be opened, however small its corners are.
-        if (IsReflex(corner, l == 0 ? tolerance_m_ : 0.0)) reflex.push_back(corner);
+        if (IsReflex(region, corner, l == 0 ? tolerance_m_ : 0.0)) reflex.push_back(corner);
       }
     }
     std::stable_sort(reflex.begin(), reflex.end(),
@@ -138,27 +192,50 @@ class Cutter {
       for (const Corner& corner : reflex) {
         const Cut cut = BestCut(region, corner, reflex, least_angle);
         if (!std::isfinite(cut.score)) continue;
-        Apply(region, corner.place, cut.end);
+        Apply(region, corner.place, cut);
         return true;
       }
     }
+    stuck_ = !any_cut_does_ && !reflex.empty();
     return false;
   }
 
-  static Cut BestCut(const Region& region, const Corner& corner, const std::vector<Corner>& reflex,
-                     double least_angle) {
-    Cut best;
+  Cut BestCut(const Region& region, const Corner& corner, const std::vector<Corner>& reflex, double least_angle) const {
     const double least = std::max(corner.angle - kPi, 0.0);
     const double most = std::min(kPi, corner.angle);
+    Cut best;
     for (const double angle : {0.5 * corner.angle, least, most}) {
-      if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) continue;
-      const Eigen::Vector2d direction = Eigen::Rotation2Dd(angle) * corner.to_next.normalized();
-      const Hit hit = Shoot(region, corner.at, direction);
-      if (!std::isfinite(hit.distance)) continue;
-      const double at_end = std::acos(std::clamp(std::abs(direction.dot(hit.side)), 0.0, 1.0));
-      const double score = hit.distance / (Squareness(std::min(angle, corner.angle - angle)) * Squareness(at_end));
-      if (score < best.score * (1 - 1e-9)) best = {Snapped(region, corner, hit, least, most), score};
+      CutAt(region, corner, angle, least_angle, best);
     }
+    ToPartner(region, corner, reflex, least_angle, best);
+    if (std::isfinite(best.score) || any_cut_does_) return best;
+    for (const double share : kFan) CutAt(region, corner, least + share * (most - least), least_angle, best);
+    return best;
+  }
+
+  /// The cut that leaves a corner at an angle from its next side, if it is better.
+  void CutAt(const Region& region, const Corner& corner, double angle, double least_angle, Cut& best) const {
+    const double least = std::max(corner.angle - kPi, 0.0);
+    const double most = std::min(kPi, corner.angle);
+    if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) return;
+    const Eigen::Vector2d direction = Eigen::Rotation2Dd(angle) * corner.to_next.normalized();
+    const Hit hit = Shoot(region, corner.at, direction);
+    if (!std::isfinite(hit.distance)) return;
+    const double at_end = std::acos(std::clamp(std::abs(direction.dot(hit.side)), 0.0, 1.0));
+    const double score = hit.distance / (Squareness(std::min(angle, corner.angle - angle)) * Squareness(at_end));
+    if (score >= best.score * (1 - 1e-9)) return;
+    const Place end = Snapped(region, corner, hit, least, most);
+    if (end.share != hit.place.share || end.index != hit.place.index) {  // at a corner
+      best = {end, region.loops[end.loop][end.index], score};
+    } else if (const auto point = EndOf(region, corner, direction, hit)) {
+      best = {end, *point, score};
+    }
+  }
+
+  void ToPartner(const Region& region, const Corner& corner, const std::vector<Corner>& reflex, double least_angle,
+                 Cut& best) const {
+    const double least = std::max(corner.angle - kPi, 0.0);
+    const double most = std::min(kPi, corner.angle);
     std::vector<std::pair<double, const Corner*>> partners;
     for (const Corner& other : reflex) {
       const double distance = (other.at - corner.at).norm();
@@ -172,20 +249,20 @@ class Cutter {
       const double angle = Turn(corner.to_next, direction);
       if (angle < least - 1e-9 || angle > most + 1e-9) continue;
       if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) continue;
-      if (!Within(*other, -direction) || !Sees(region, corner, *other, distance)) continue;
+      if (!Within(*other, -direction) || !Reaches(region, corner, *other)) continue;
       const double there = Turn(other->to_next, -direction);
       if (std::min(there, other->angle - there) < least_angle) continue;
       const bool both = there >= other->angle - kPi - 1e-9 && there <= kPi + 1e-9;
       const double score =
           distance * (both ? 0.5 : 1.0) /
           (Squareness(std::min(angle, corner.angle - angle)) * Squareness(std::min(there, other->angle - there)));
-      if (score < best.score * (1 - 1e-9)) best = {other->place, score};
+      if (score < best.score * (1 - 1e-9))
+        best = {other->place, region.loops[other->place.loop][other->place.index], score};
     }
-    return best;
   }
 
   /// Ends a cut at a corner where it comes close to one, if the corner can take it.
-  static Place Snapped(const Region& region, const Corner& corner, const Hit& hit, double least, double most) {
+  Place Snapped(const Region& region, const Corner& corner, const Hit& hit, double least, double most) const {
     const SlabLoop& loop = region.loops[hit.place.loop];
     for (const std::size_t index : {hit.place.index, (hit.place.index + 1) % loop.size()}) {
       const Corner other = CornerAt(region, hit.place.loop, index);
@@ -199,14 +276,57 @@ class Cutter {
       const double angle = Turn(corner.to_next, way);
       const double slack = off <= kTouch_m ? 1e-6 : 0.0;
       if (angle < least - slack || angle > most + slack) continue;
-      if (Within(other, -way) && Sees(region, corner, other, way.norm())) return other.place;
+      if (Within(other, -way) && Reaches(region, corner, other)) return other.place;
     }
     return hit.place;
   }
 
-  static bool Sees(const Region& region, const Corner& from, const Corner& to, double distance) {
-    const Hit hit = Shoot(region, from.at, (to.at - from.at) / distance);
-    return hit.distance >= distance - 2 * kTouch_m;
+  /// Whether a cut leads from corner to corner, and is plane if it has to be.
+  bool Reaches(const Region& region, const Corner& from, const Corner& to) const {
+    const Eigen::Vector2d way = to.at - from.at;
+    const double distance = way.norm();
+    const Eigen::Vector2d direction = way / distance;
+    if (Shoot(region, from.at, direction).distance < distance - 2 * kTouch_m) return false;
+    if (any_cut_does_) return true;
+    const SlabPoint& a = region.loops[from.place.loop][from.place.index];
+    const SlabPoint& b = region.loops[to.place.loop][to.place.index];
+    return std::all_of(kEnds.begin(), kEnds.end(), [&](Height end) {
+      const Eigen::Vector2d there = b.*end - a.*end;
+      const double along = there.dot(direction);
+      return std::abs(Cross(there, direction)) <= kPlane_m && along >= -kPlane_m &&
+             Shoot(region, a.*end, direction, end).distance >= along - kPlane_m;
+    });
+  }
+
+  /// Where a plane cut ends on the side that was hit, at the ends of the slab, too; nothing where it comes to another
+  /// side there.
+  std::optional<SlabPoint> EndOf(const Region& region, const Corner& corner, const Eigen::Vector2d& direction,
+                                 const Hit& hit) const {
+    const SlabLoop& loop = region.loops[hit.place.loop];
+    SlabPoint point = PointAt(loop, hit.place);
+    if (any_cut_does_) return point;
+    const SlabPoint& from = region.loops[corner.place.loop][corner.place.index];
+    const SlabPoint& a = loop[hit.place.index];
+    const SlabPoint& b = loop[(hit.place.index + 1) % loop.size()];
+    for (const Height end : kEnds) {
+      const Eigen::Vector2d way = a.*end - from.*end;
+      const Eigen::Vector2d side = b.*end - a.*end;
+      const double across = Cross(direction, side);
+      if (side.norm() <= kPlane_m) {
+        if (std::abs(Cross(way, direction)) > kPlane_m) return std::nullopt;
+        point.*end = a.*end;
+      } else {
+        if (across <= 0) return std::nullopt;
+        const double share = Cross(way, direction) / across;
+        const double slack = kPlane_m / side.norm();
+        if (share < -slack || share > 1 + slack) return std::nullopt;
+        point.*end = a.*end + std::clamp(share, 0.0, 1.0) * side;
+      }
+      const double along = (point.*end - from.*end).dot(direction);
+      if (along < -kPlane_m || Shoot(region, from.*end, direction, end).distance < along - kPlane_m)
+        return std::nullopt;
+    }
+    return point;
   }
 
   static SlabPoint PointAt(const SlabLoop& loop, const Place& place) {
@@ -218,18 +338,18 @@ class Cutter {
     return {mix(a.middle, b.middle), mix(a.low, b.low), mix(a.high, b.high)};
   }
 
-  void Apply(Region& region, Place begin, Place end) {
+  void Apply(Region& region, Place begin, const Cut& cut) {
+    Place end = cut.end;
     SlabLoop& end_loop = region.loops[end.loop];
     if (end.share > 0) {
       const SlabPoint& a = end_loop[end.index];
       const SlabPoint& b = end_loop[(end.index + 1) % end_loop.size()];
-      const SlabPoint point = PointAt(end_loop, end);
-      if ((point.middle - b.middle).norm() < kTouch_m) {
+      if ((cut.point.middle - b.middle).norm() < kTouch_m) {
         end = {end.loop, (end.index + 1) % end_loop.size(), 0.0};
-      } else if ((point.middle - a.middle).norm() < kTouch_m) {
+      } else if ((cut.point.middle - a.middle).norm() < kTouch_m) {
         end.share = 0;
       } else {
-        end_loop.insert(end_loop.begin() + static_cast<std::ptrdiff_t>(end.index) + 1, point);
+        end_loop.insert(end_loop.begin() + static_cast<std::ptrdiff_t>(end.index) + 1, cut.point);
         if (begin.loop == end.loop && begin.index > end.index) ++begin.index;
         end = {end.loop, end.index + 1, 0.0};
       }
@@ -285,8 +405,7 @@ class Cutter {
       Region* smallest = nullptr;
       for (Region& region : made) {
         const SlabLoop& around = region.loops.front();
-        if (!Encloses(around, hole.front().middle) && !Encloses(around, 0.5 * (hole[0].middle + hole[1].middle)))
-          continue;
+        if (!Holds(around, hole)) continue;
         if (smallest == nullptr || SignedArea(around) < SignedArea(smallest->loops.front())) smallest = &region;
       }
       if (smallest != nullptr) smallest->loops.push_back(std::move(hole));
@@ -296,12 +415,15 @@ class Cutter {
 
  private:
   double tolerance_m_;
+  bool any_cut_does_;
+  bool stuck_ = false;
   std::vector<Region> regions_;
 };
 
 }  // namespace
 
-std::vector<SlabLoop> ConvexPartition(const std::vector<SlabLoop>& loops, double tolerance_m) {
+std::optional<std::vector<SlabLoop>> ConvexPartition(const std::vector<SlabLoop>& loops, double tolerance_m,
+                                                     bool plane_only) {
   std::vector<SlabLoop> outer;
   std::vector<SlabLoop> holes;
   for (const SlabLoop& loop : loops) {
@@ -311,7 +433,7 @@ std::vector<SlabLoop> ConvexPartition(const std::vector<SlabLoop>& loops, double
   Cutter::Distribute(std::move(outer), std::move(holes), regions);
   std::vector<SlabLoop> polygons;
   for (Region& region : regions) {
-    for (SlabLoop& polygon : Cutter(std::move(region), tolerance_m).Run()) polygons.push_back(std::move(polygon));
+    if (!Cutter(std::move(region), tolerance_m, plane_only).Run(polygons)) return std::nullopt;
   }
   return polygons;
 }

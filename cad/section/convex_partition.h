@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "feeler/cad/section/section.h"
@@ -11,6 +12,9 @@ namespace feeler::cad {
 /// or a side that it meets squarely, so that a rectangular hole leaves rectangles and a round one wedges. Corners that
 /// are not convex by `tolerance_m` or less stay. A polygon's points are those of the loops, and such on their sides;
 /// deterministic.
-std::vector<SlabLoop> ConvexPartition(const std::vector<SlabLoop>& loops, double tolerance_m);
+/// A cut is plane over the whole slab, so that what is convex in its middle is convex at its ends. `plane_only`:
+/// nothing where there is no such cut (a thinner slab may have one); else it is taken as it comes.
+std::optional<std::vector<SlabLoop>> ConvexPartition(const std::vector<SlabLoop>& loops, double tolerance_m,
+                                                     bool plane_only);
 
 }  // namespace feeler::cad

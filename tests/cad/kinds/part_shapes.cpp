@@ -10,6 +10,7 @@
 #include <BRepPrimAPI_MakeCone.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepPrimAPI_MakePrism.hxx>
+#include <BRepPrimAPI_MakeWedge.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <Message.hxx>
@@ -64,6 +65,15 @@ Shape Turned(const Shape& shape, const gp_Dir& axis, double degrees) {
   gp_Trsf turn;
   turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), axis), degrees * kPi / 180);
   return BRepBuilderAPI_Transform(shape, turn, true).Shape();
+}
+
+/// A rectangle that widens upwards by as much as it is high: what a chamfer of 45 degrees takes away.
+Shape Flare(double x0, double x1, double y0, double y1, double z0, double z1) {
+  const double h = z1 - z0;
+  // The wedge stands along y: its axes are turned onto z.
+  return BRepPrimAPI_MakeWedge(gp_Ax2(gp_Pnt(x0 - h, y1 + h, z1), gp_Dir(0, 1, 0), gp_Dir(1, 0, 0)), x1 - x0 + 2 * h, h,
+                               y1 - y0 + 2 * h, h, h, h + x1 - x0, h + y1 - y0)
+      .Shape();
 }
 
 struct Pair {
@@ -157,6 +167,22 @@ Pair LongTaper() {
   return {Cone(5.0, 6.5, 0, 30) + Rod(0, 0, 6.5, 30, 60), Block(34, 34, -25, 0) - Cone(5.05, 6.05, -20, 0)};
 }
 
+/// A rectangular hole with a lead-in of 1 mm.
+Pair Chamfered() {
+  const double c = 0.2;
+  return {Block(10, 8, 0, 40),
+          Block(40, 40, -20, 0) - (Block(10 + 2 * c, 8 + 2 * c, -12, 0) + Flare(-5 - c, 5 + c, -4 - c, 4 + c, -1, 0))};
+}
+
+/// The same of a hole that is not convex.
+Pair ChamferedTee() {
+  const double c = 0.2;
+  return {
+      Box3(-8, 8, 2, 6, 0, 40) + Box3(-2, 2, -8, 3, 0, 40),
+      Block(40, 40, -20, 0) - (Box3(-8 - c, 8 + c, 2 - c, 6 + c, -12, 0) + Box3(-2 - c, 2 + c, -8 - c, 3 + c, -12, 0) +
+                               Flare(-8 - c, 8 + c, 2 - c, 6 + c, -1, 0) + Flare(-2 - c, 2 + c, -8 - c, 3 + c, -1, 0))};
+}
+
 Pair Rectangle(double c) { return {Block(8, 7, 0, 50), Block(25, 25, 0, 9) - Block(8 + 2 * c, 7 + 2 * c, -1, 10)}; }
 
 Pair Tilted() {
@@ -188,6 +214,8 @@ Pair Draw(const std::string& kind) {
       {"hex-socket", HexSocket},
       {"taper", Taper},
       {"long-taper", LongTaper},
+      {"chamfered", Chamfered},
+      {"chamfered-tee", ChamferedTee},
       {"rectangle", [] { return Rectangle(0.1); }},
       {"tilted", Tilted},
       {"assembly", Assembled},
@@ -357,6 +385,8 @@ std::vector<PartKind> PartKinds() {
           {"hex-socket", 0.1, 0.1, 8.0, true},
           {"taper", 0.0, 0.0, 0.0},
           {"tilted", 0.1, 0.1, 9.0},
+          {"chamfered", 0.2, 0.2, 12.0},
+          {"chamfered-tee", 0.2, 0.2, 12.0},
           {"assembly", 0.15, 0.15, 12.0, false, true}};
 }
 
