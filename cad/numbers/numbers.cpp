@@ -12,11 +12,12 @@
 namespace feeler::cad {
 namespace {
 
-constexpr double kFlangeToTool_m = 0.13;  // adapter, palm and fingers of the gripper (env/scene/gripper.h)
-constexpr double kFingers_m = 0.016;      // how far they reach down over the tool
-constexpr double kFingerRoom_m = 0.003;   // that stays between them and the target
-constexpr double kFarthestSide_m = 0.08;  // farther sides are not worth the size of the contact map
-constexpr double kLowestTarget_m = 0.2;   // of the mouth over the table: what the arm reaches well
+constexpr double kFlangeToTool_m = 0.13;    // adapter, palm and fingers of the gripper (env/scene/gripper.h)
+constexpr double kFingers_m = 0.016;        // how far they reach down over the tool
+constexpr double kFingerRoom_m = 0.003;     // that stays between them and the target
+constexpr double kFarthestSide_m = 0.08;    // farther sides are not worth the size of the contact map
+constexpr double kLowestTarget_m = 0.2;     // of the mouth over the table: what the arm reaches well
+constexpr double kTransferRoom_m = 0.0045;  // over what a transfer keeps clear (env/robot/transfer_checker.h)
 constexpr int kMostCells = 64;
 
 std::string Plain(double value) {
@@ -169,10 +170,12 @@ class Derivation {
     const double c = result_.cell_m;
     const auto up = [&](double value) { return c * std::ceil(value / c - 1e-9); };
     const double top = std::max(target_.max().z(), 0.0);
-    const double start = up(top + 0.5 * Range(2) + 3 * c);
+    const double room = std::max(3 * c, kTransferRoom_m);
+    const double start = up(top + 0.5 * Range(2) + room);
     Add("feeler_start_offset", false, Plain(Eigen::Vector3d(0, 0, start)),
-        fmt::format("top of the target {} mm over the mouth, half the range of heights {} mm, 3 cells",
-                    Plain(1000 * top), Plain(500 * Range(2))));
+        fmt::format("top of the target {} mm over the mouth, half the range of heights {} mm, {}", Plain(1000 * top),
+                    Plain(500 * Range(2)),
+                    room > 3 * c ? Plain(1000 * room) + " mm for the transfer, which keeps 4 mm clear" : "3 cells"));
     Eigen::Vector3d low;
     Eigen::Vector3d high;
     for (int k = 0; k < 2; ++k) {

@@ -230,7 +230,7 @@ void Import(const TaskImportFlags& flags, Session& session) {
     Print(task, verdict);
   }
   if (session.cancellation->cancelled()) session.exit_code = 1;
-  if (trial && !(trial->solved && trial->verified)) session.exit_code = 1;
+  if (trial && !evaluation::Works(*trial)) session.exit_code = 1;
 }
 
 }  // namespace

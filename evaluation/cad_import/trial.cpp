@@ -73,6 +73,18 @@ std::vector<std::string> FeltLines(const workflow::PlanningSetup& setup) {
   return lines;
 }
 
+/// "ideal: 3 of 60 inserted, 4.2 s, 12 N at most (57 failed: 40 x off the policy tree, 17 x ...)".
+std::string Describe(const TrialRun& run) {
+  const RunSummary& summary = run.summary;
+  std::string text = fmt::format("{}: {} of {} inserted", run.noise, summary.inserted.successes, summary.episodes);
+  if (summary.inserted.successes > 0)
+    text += fmt::format(", {:.1f} s, {:.0f} N at most", summary.sim_time_median_s, summary.peak_force_max_n);
+  std::string reasons;
+  for (const auto& [reason, count] : summary.failures)
+    reasons += fmt::format("{}{} x {}", reasons.empty() ? "" : ", ", count, reason);
+  return reasons.empty() ? text : fmt::format("{} (failed: {})", text, reasons);
+}
+
 }  // namespace
 
 Trial RunTrial(const ImportedTask& task, const TrialOptions& options) {
@@ -142,12 +154,14 @@ std::string Verdict(const ImportedTask& task, const std::optional<Trial>& trial)
   }
   std::string text = fmt::format("{}: {} solved within {:.2f} of the optimum and {}", parts, trial->extents,
                                  trial->ratio, trial->verified ? "verified" : "NOT verified");
-  for (const TrialRun& run : trial->runs) {
-    text +=
-        fmt::format("; {}: {} of {} inserted, {:.1f} s, {:.0f} N at most", run.noise, run.summary.inserted.successes,
-                    run.summary.episodes, run.summary.sim_time_median_s, run.summary.peak_force_max_n);
-  }
+  for (const TrialRun& run : trial->runs) text += "; " + Describe(run);
   return text + ".";
+}
+
+bool Works(const Trial& trial) {
+  return trial.solved && trial.verified && !trial.runs.empty() &&
+         std::all_of(trial.runs.begin(), trial.runs.end(),
+                     [](const TrialRun& run) { return run.summary.inserted.successes > 0; });
 }
 
 }  // namespace feeler::evaluation

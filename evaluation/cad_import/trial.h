@@ -51,7 +51,10 @@ struct Trial {
 /// flush part), with the spiral search. Throws what loading throws.
 Trial RunTrial(const ImportedTask& task, const TrialOptions& options);
 
-/// One sentence: does it work, and how well.
+/// Solved, verified, and under no noise all episodes failed.
+bool Works(const Trial& trial);
+
+/// One sentence: does it work, and how well; and why not.
 std::string Verdict(const ImportedTask& task, const std::optional<Trial>& trial);
 
 }  // namespace feeler::evaluation

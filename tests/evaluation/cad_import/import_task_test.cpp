@@ -13,6 +13,7 @@
 #include "feeler/core/error.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/model/task_xml.h"
+#include "feeler/evaluation/cad_import/trial.h"
 #include "tests/cad/kinds/part_shapes.h"
 
 namespace feeler::evaluation {
@@ -49,6 +50,29 @@ TEST_F(ImportTaskTest, LoadsWithTheClearanceThatWasDrawn) {
   EXPECT_NEAR(model.task.insertion_depth_m, 0.012, 1e-5);
   EXPECT_EQ(model.lid_geoms.size(), 1U);
   EXPECT_GE(task.content.numbers.margin_cells, 0.3);
+}
+
+TEST_F(ImportTaskTest, TheStartIsAsFarAsATransferKeepsClear) {
+  ImportOptions options = OptionsFor("keyed", "step");
+  options.overrides["feeler_resolution"] = "0.0008 0.0008 0.0008";
+  const ImportedTask task = ImportTask(options);
+  const env::TaskModel model = env::LoadTask(task.task_file.string());
+  const double highest_m = 0.5 * 0.0008 * (task.content.numbers.cells.back() - 1);
+  EXPECT_GE(model.task.start_offset_m.z() - highest_m, 0.004);
+}
+
+TEST(TrialVerdict, SaysWhyNothingWasInserted) {
+  Trial trial;
+  trial.solved = trial.verified = true;
+  TrialRun run{"ideal", "database", {}};
+  run.summary.episodes = 30;
+  run.summary.failures["transfer to the start pose"] = 30;
+  trial.runs.push_back(run);
+  EXPECT_FALSE(Works(trial));
+  EXPECT_THAT(Verdict({}, trial),
+              testing::HasSubstr("ideal: 0 of 30 inserted (failed: 30 x transfer to the start pose)"));
+  trial.runs.front().summary.inserted.successes = 1;
+  EXPECT_TRUE(Works(trial));
 }
 
 TEST_F(ImportTaskTest, SameInputGivesSameBytes) {
