@@ -53,18 +53,22 @@ struct Found {
   Eigen::Vector3d offset;
   double engaged_m;
   double slack_m;
-  double engaged_m3 = 0.0;  ///< of material in the other part's holes: of two pins both count
+  double engaged_m3 = 0.0;   ///< of material in the other part's holes: of two pins both count
+  Eigen::Vector2d middle{};  ///< of that material, in the frame of the turned target
+  Eigen::Vector3d mouth{};   ///< in CAD coordinates of the target
 };
 
-/// Area of the loops around material of one section that lie in holes of the other.
-double AreaInHoles(const std::vector<SlabLoop>& inside, const std::vector<SlabLoop>& around) {
+/// Area of the loops around material of one section that lie in holes of the other, and the box around them.
+double AreaInHoles(const std::vector<SlabLoop>& inside, const std::vector<SlabLoop>& around, Eigen::AlignedBox2d& box) {
   double area = 0;
   for (const SlabLoop& loop : inside) {
     if (SignedArea(loop) < 0) continue;
     const bool held = std::any_of(around.begin(), around.end(), [&](const SlabLoop& hole) {
       return SignedArea(hole) < 0 && Encloses(hole, loop.front().middle);
     });
-    if (held) area += SignedArea(loop);
+    if (!held) continue;
+    area += SignedArea(loop);
+    box.extend(BoundsOf(loop));
   }
   return area;
 }
@@ -236,8 +240,11 @@ std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const
   for (Eigen::Vector3d& point : in.points) point += found.offset;
   const std::vector<SlabLoop> tool_section = SectionAt(in, middle);
   const std::vector<SlabLoop> target_section = SectionAt(target.mesh, middle);
-  found.engaged_m3 =
-      found.engaged_m * (AreaInHoles(tool_section, target_section) + AreaInHoles(target_section, tool_section));
+  Eigen::AlignedBox2d held;
+  const double area = AreaInHoles(tool_section, target_section, held) + AreaInHoles(target_section, tool_section, held);
+  found.engaged_m3 = found.engaged_m * area;
+  found.middle = held.isEmpty() ? BoundsOf(in).center().head<2>().eval() : held.center();
+  found.mouth = target.rotation.transpose() * Eigen::Vector3d(found.middle.x(), found.middle.y(), trial.high_m);
   return found;
 }
 
@@ -254,9 +261,13 @@ Pose FrameOf(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& offset) {
   return pose;
 }
 
-Eigen::Vector3d MouthInTarget(const Turned& target, const Turned& tool, const Found& found) {
-  const Box box = BoundsOf(Transformed(tool.mesh, FrameOf(Roll(found.trial.roll_rad), found.offset)));
-  return target.rotation.transpose() * Eigen::Vector3d(box.center().x(), box.center().y(), found.trial.high_m);
+/// Whether two ways in lead to one place: what is in holes lies there, or the tool stands there.
+bool OneMouth(const Found& a, const Found& b) {
+  if (a.trial.target != b.trial.target) return false;
+  const double near_m = 5e-4 + 2 * std::min(a.slack_m, b.slack_m);
+  if ((a.middle - b.middle).norm() <= near_m) return true;
+  return a.trial.tool == b.trial.tool && a.trial.roll_rad == b.trial.roll_rad &&
+         (a.offset - b.offset).head<2>().norm() <= near_m;
 }
 
 std::string InMillimetres(const Eigen::Vector3d& p) {
@@ -281,6 +292,48 @@ std::string InMillimetres(const Eigen::Vector3d& p) {
       "check the sizes and the --unit");
 }
 
+/// Of what fits, the tightest; of equals the deepest.
+std::vector<const Found*> BestFits(const std::vector<Found>& found) {
+  // What has little in the other part's holes went there by chance.
+  double most = 0;
+  for (const Found& f : found) most = std::max(most, f.engaged_m3);
+  double tightest = std::numeric_limits<double>::infinity();
+  const auto by_chance = [&](const Found& f) { return f.engaged_m3 < 0.7 * most; };
+  for (const Found& f : found) {
+    if (!by_chance(f)) tightest = std::min(tightest, f.slack_m);
+  }
+  const auto as_tight = [&](const Found& f) { return !by_chance(f) && f.slack_m <= 1.25 * tightest + 5e-6; };
+  double deepest = 0;
+  for (const Found& f : found) {
+    if (as_tight(f)) deepest = std::max(deepest, f.engaged_m);
+  }
+  std::vector<const Found*> best;
+  for (const Found& f : found) {
+    if (as_tight(f) && f.engaged_m >= 0.9 * deepest) best.push_back(&f);
+  }
+  return best;
+}
+
+[[noreturn]] void NoMouthNear(const Eigen::Vector3d& place, const std::vector<Found>& found) {
+  std::string mouths;
+  std::vector<const Found*> named;
+  for (const Found* fit : BestFits(found)) {
+    if (std::any_of(named.begin(), named.end(), [&](const Found* known) { return OneMouth(*fit, *known); })) continue;
+    named.push_back(fit);
+    mouths += (mouths.empty() ? "" : " and ") + InMillimetres(fit->mouth);
+  }
+  throw InputError("--mouth", fmt::format("no mouth near {} mm", InMillimetres(place)),
+                   fmt::format("the tool fits at {} mm", mouths));
+}
+
+/// Of equal fits those in the mouth that was asked for.
+void KeepNearest(const Eigen::Vector3d& place, std::vector<const Found*>& fits) {
+  const Found& nearest = **std::min_element(fits.begin(), fits.end(), [&](const Found* a, const Found* b) {
+    return (a->mouth - place).norm() < (b->mouth - place).norm() - 1e-9;
+  });
+  std::erase_if(fits, [&](const Found* fit) { return !OneMouth(*fit, nearest); });
+}
+
 }  // namespace
 
 Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, const AlignOptions& options) {
@@ -299,55 +352,35 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
     if (++tried > kMostTrials) break;
     Turned& turned = targets[trial.target];
     if (!turned.tree) turned.tree = std::make_unique<MeshTree>(turned.mesh);
-    if (auto result = Verify(tools[trial.tool], turned, trial)) {
-      if (!options.mouth ||
-          (MouthInTarget(turned, tools[trial.tool], *result) - *options.mouth).norm() < 0.5 * trial.size_m + 2e-3) {
-        found.push_back(*result);
-      }
-    }
+    if (auto result = Verify(tools[trial.tool], turned, trial)) found.push_back(*result);
   }
   if (found.empty()) NoFit(miss, true);
-  // What has little in the other part's holes went there by chance.
-  double most = 0;
-  for (const Found& f : found) most = std::max(most, f.engaged_m3);
-  std::erase_if(found, [&](const Found& f) { return f.engaged_m3 < 0.7 * most; });
-  // The tightest fit; of equals the deepest; of equals that nearest to the CAD frames.
-  const auto tightest = *std::min_element(found.begin(), found.end(),
-                                          [](const Found& a, const Found& b) { return a.slack_m < b.slack_m; });
-  double deepest = 0;
-  const auto as_tight = [&](const Found& f) { return f.slack_m <= 1.25 * tightest.slack_m + 5e-6; };
-  for (const Found& f : found) {
-    if (as_tight(f)) deepest = std::max(deepest, f.engaged_m);
+  if (options.mouth) {
+    const std::vector<Found> all = found;
+    std::erase_if(found,
+                  [&](const Found& f) { return (f.mouth - *options.mouth).norm() >= 0.5 * f.trial.size_m + 2e-3; });
+    if (found.empty()) NoMouthNear(*options.mouth, all);
   }
-  const Found* best = nullptr;
-  std::vector<const Found*> equals;
-  for (const Found& f : found) {
-    if (!as_tight(f) || f.engaged_m < 0.9 * deepest) continue;
-    equals.push_back(&f);
-    if (best == nullptr || Strangeness(f) < Strangeness(*best) - 1e-9) best = &f;
+  std::vector<const Found*> equals = BestFits(found);
+  if (options.mouth) KeepNearest(*options.mouth, equals);
+  // Of equals that nearest to the CAD frames.
+  const Found* best = equals.front();
+  for (const Found* fit : equals) {
+    if (Strangeness(*fit) < Strangeness(*best) - 1e-9) best = fit;
   }
-  const Turned& chosen_tool = tools[best->trial.tool];
-  const Turned& chosen_target = targets[best->trial.target];
-  Alignment alignment;
-  const Eigen::Vector3d mouth = MouthInTarget(chosen_target, chosen_tool, *best);
-  int ways = 0;
   for (const Found* other : equals) {
-    if (other == best) continue;
-    if (other->trial.target == best->trial.target) {
-      const Eigen::Vector3d there = MouthInTarget(chosen_target, tools[other->trial.tool], *other);
-      if ((there - mouth).norm() > 5e-4 + 2 * best->slack_m) {
-        throw InputError(
-            "target",
-            fmt::format("two mouths fit as well: at {} and at {} mm", InMillimetres(mouth), InMillimetres(there)),
-            "choose one with --mouth X,Y,Z");
-      }
-    }
-    ++ways;
+    if (other->trial.target != best->trial.target || OneMouth(*other, *best)) continue;
+    throw InputError("target",
+                     fmt::format("two mouths fit as well: at {} and at {} mm", InMillimetres(best->mouth),
+                                 InMillimetres(other->mouth)),
+                     "choose one with --mouth X,Y,Z");
   }
-  if (ways > 0)
+  Alignment alignment;
+  if (equals.size() > 1)
     alignment.notes.push_back(fmt::format(
-        "the parts go together in {} ways that are alike; taken is the one nearest to the CAD frames", ways + 1));
-  alignment.frame_T_tool = FrameOf(Roll(best->trial.roll_rad) * chosen_tool.rotation, best->offset);
+        "the parts go together in {} ways that are alike; taken is the one nearest to the CAD frames", equals.size()));
+  const Turned& chosen_target = targets[best->trial.target];
+  alignment.frame_T_tool = FrameOf(Roll(best->trial.roll_rad) * tools[best->trial.tool].rotation, best->offset);
   alignment.frame_T_target = FrameOf(chosen_target.rotation, Eigen::Vector3d::Zero());
   alignment.tool_has_opening = best->trial.tool_has_opening;
   alignment.engaged_m = best->engaged_m;

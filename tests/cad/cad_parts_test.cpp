@@ -276,6 +276,20 @@ TEST_F(CadParts, WhatDoesNotFitOrFitsTwiceIsRefused) {
               testing::HasSubstr("two mouths fit as well: at -15.00,0.00,0.00 and at 15.00,0.00,0.00 mm"));
 }
 
+TEST_F(CadParts, AMouthIsChosenByWhereItIs) {
+  const PartFiles files = WriteParts("two-mouths", folder_, "stl");
+  const TriangleMesh tool = Read(files.tool).mesh;
+  const TriangleMesh target = Read(files.target).mesh;
+  AlignOptions options;
+  options.mouth = Eigen::Vector3d(0.013, 0, 0);
+  const Alignment alignment = FindAlignment(tool, target, options);
+  EXPECT_NEAR((alignment.frame_T_target.inverse() * alignment.frame_T_tool).translation().x(), 0.015, 2e-4);
+  options.mouth = Eigen::Vector3d::Zero();
+  EXPECT_THAT(MessageOf([&] { FindAlignment(tool, target, options); }),
+              testing::HasSubstr("--mouth: no mouth near 0.00,0.00,0.00 mm (the tool fits at -15.00,0.00,0.00 and "
+                                 "15.00,0.00,0.00 mm)"));
+}
+
 TEST_F(CadParts, EveryMeshFormatIsOnePart) {
   for (const std::string kind : {"keyed", "usb-a"}) {
     const TriangleMesh expected = Read(WriteParts(kind, folder_, "stl").tool).mesh;

@@ -167,6 +167,12 @@ Pair LongTaper() {
   return {Cone(5.0, 6.5, 0, 30) + Rod(0, 0, 6.5, 30, 60), Block(34, 34, -25, 0) - Cone(5.05, 6.05, -20, 0)};
 }
 
+/// A shell that goes over a tongue which stands 1 mm below the rim: holes begin at two heights.
+Pair Shell() {
+  const Shape tool = (Block(12, 4.5, 0, 12) - Box3(-5.6, 5.6, -0.3, 1.9, -1, 13)) + Block(14, 8, 11.9, 45);
+  return {tool, (Block(24, 16, -20, 0) - Block(12.4, 4.9, -13, 1)) + Box3(-5.3, 5.3, -0.05, 1.65, -13.5, -1)};
+}
+
 /// A rectangular hole with a lead-in of 1 mm.
 Pair Chamfered() {
   const double c = 0.2;
@@ -214,6 +220,7 @@ Pair Draw(const std::string& kind) {
       {"hex-socket", HexSocket},
       {"taper", Taper},
       {"long-taper", LongTaper},
+      {"shell", Shell},
       {"chamfered", Chamfered},
       {"chamfered-tee", ChamferedTee},
       {"rectangle", [] { return Rectangle(0.1); }},
@@ -375,19 +382,13 @@ void WriteMesh(const TriangleMesh& mesh, const std::filesystem::path& file, cons
 }  // namespace
 
 std::vector<PartKind> PartKinds() {
-  return {{"keyed", 0.15, 0.15, 12.0},
-          {"d-plug", 0.12, 0.12, 10.0},
-          {"usb-a", 0.2, 0.2, 12.0},
-          {"rj45", 0.13, 0.13, 14.0},
-          {"two-pin", 0.2, 0.2, 19.0},
-          {"three-pin", 0.2, 0.2, 22.0},
-          {"gear", 0.1, 0.1, 18.0, true},
-          {"hex-socket", 0.1, 0.1, 8.0, true},
-          {"taper", 0.0, 0.0, 0.0},
-          {"tilted", 0.1, 0.1, 9.0},
-          {"chamfered", 0.2, 0.2, 12.0},
-          {"chamfered-tee", 0.2, 0.2, 12.0},
-          {"assembly", 0.15, 0.15, 12.0, false, true}};
+  return {{"keyed", 0.15, 0.15, 12.0},    {"d-plug", 0.12, 0.12, 10.0},
+          {"usb-a", 0.2, 0.2, 12.0},      {"rj45", 0.13, 0.13, 14.0},
+          {"two-pin", 0.2, 0.2, 19.0},    {"three-pin", 0.2, 0.2, 22.0},
+          {"gear", 0.1, 0.1, 18.0, true}, {"hex-socket", 0.1, 0.1, 8.0, true},
+          {"taper", 0.0, 0.0, 0.0},       {"tilted", 0.1, 0.1, 9.0},
+          {"chamfered", 0.2, 0.2, 12.0},  {"chamfered-tee", 0.2, 0.2, 12.0},
+          {"shell", 0.2, 0.2, 11.9},      {"assembly", 0.15, 0.15, 12.0, false, true}};
 }
 
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format) {
