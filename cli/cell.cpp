@@ -83,9 +83,10 @@ void Tell(const CellFlags& flags, const execution::CellFile& cell) {
     return;
   }
   Print(
-      "bias {:.2f} N, noise {:.2f} N, contacts from {:.1f} N on; stiffness {:.0f} N/m, reaction {};\n"
+      "bias {:.2f} N, noise {:.2f} N, contacts from {:.1f} N on; stiffness {}, reaction {};\n"
       "tool centre point off by {:.2f} {:.2f} {:.2f} mm\n",
-      *cell.force_bias_n, *cell.force_noise_n, *cell.contact_force_n, *cell.stiffness_n_m,
+      *cell.force_bias_n, *cell.force_noise_n, *cell.contact_force_n,
+      cell.stiffness_n_m ? fmt::format("{:.0f} N/m", *cell.stiffness_n_m) : "not measured",
       cell.reaction_time_s ? fmt::format("{:.1f} ms", 1e3 * *cell.reaction_time_s) : "not measured",
       1e3 * cell.tool_offset_m.x(), 1e3 * cell.tool_offset_m.y(), 1e3 * cell.tool_offset_m.z());
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -97,8 +98,11 @@ class Prober {
       result = Straight(place, speed_m_s, most_n);
     }
     if (result.reason != StopReason::kReached && result.reason != StopReason::kContact) Fail("a press", result, true);
+    const bool met = result.contact || robot_.ContactWrench().force_n.z() > most_n;
     GoTo({x_m, y_m, above()}, true);
-    return points;
+    if (met) return points;
+    throw WorldError("calibration", fmt::format("pressing onto the block never meets {:g} N: it gives way", most_n),
+                     "fix the block, or give a lower --contact-force");
   }
 
   /// Against a side of the block from outside, at its middle; the coordinate across it.
@@ -179,8 +183,8 @@ double HarderForce(const CalibrationSettings& settings) {
                    fmt::format("give at most {:.3g}", settings.most_force_n / kLeastHarder));
 }
 
-/// Force over depth, by least squares. Throws WorldError where the points tell none.
-double Stiffness(const std::vector<Eigen::Vector2d>& points, double noise_n) {
+/// Force over depth, by least squares; empty where the points tell none: a contact stiffer than depths are told.
+std::optional<double> Stiffness(const std::vector<Eigen::Vector2d>& points, double noise_n) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& point : points) mean += point / static_cast<double>(points.size());
   double across = 0.0;
@@ -196,8 +200,7 @@ double Stiffness(const std::vector<Eigen::Vector2d>& points, double noise_n) {
   const bool told = points.size() >= kLeastPoints && range.sizes().x() > kLeastDepth_m &&
                     range.sizes().y() > 6.0 * noise_n && across < 0.0;
   if (told) return -across / square;
-  throw WorldError("calibration", "pressing onto the block tells no stiffness: force does not grow with depth",
-                   "fix the block, or give another --contact-force");
+  return {};
 }
 
 void MeasureContact(Prober& prober, const Eigen::Vector3d& middle, const CalibrationSettings& settings,
@@ -207,6 +210,10 @@ void MeasureContact(Prober& prober, const Eigen::Vector3d& middle, const Calibra
   const double hard_n = HarderForce(settings);
   const double least_n = std::max(0.4 * hard_n, 3.0 * noise_n);  // lighter ones still slip into place
   cell.stiffness_n_m = Stiffness(prober.PressTop(middle.x(), middle.y(), least_n, hard_n), noise_n);
+  if (!cell.stiffness_n_m) {
+    prober.Tell("stiffness and reaction time are left out: the contact is stiffer than the robot tells depths");
+    return;
+  }
   // While the robot does not react yet the force grows with the way: F = threshold + k v t.
   const auto peak_n = [&](double speed_m_s) {
     return prober.TouchTop(middle.x(), middle.y(), speed_m_s, settings.contact_force_n).peak_force_n;
@@ -224,7 +231,7 @@ void MeasureContact(Prober& prober, const Eigen::Vector3d& middle, const Calibra
 void RequirePlausible(const CellFile& cell) {
   constexpr double kLeastStiffness_n_m = 100.0;
   constexpr double kMostOffset_m = 0.05;
-  if (*cell.stiffness_n_m < kLeastStiffness_n_m) {
+  if (cell.stiffness_n_m && *cell.stiffness_n_m < kLeastStiffness_n_m) {
     throw WorldError("calibration", fmt::format("the block gives way: {:.3g} N/m", *cell.stiffness_n_m), "fix it");
   }
   if (const double off_m = cell.tool_offset_m.norm(); off_m > kMostOffset_m) {
@@ -265,8 +272,8 @@ CellFile Calibrate(Robot& robot, const KnownBlock& block, const CalibrationSetti
     height_m += met.world_T_tool.translation().z() / kPlaces;
   }
   MeasureContact(prober, middle, settings, cell);
-  cell.tool_offset_m.z() =
-      block.max_m.z() - (height_m + settings.contact_force_n / *cell.stiffness_n_m);  // less the give of the contact
+  const double give_m = cell.stiffness_n_m ? settings.contact_force_n / *cell.stiffness_n_m : 0.0;
+  cell.tool_offset_m.z() = block.max_m.z() - (height_m + give_m);
   for (int axis = 0; axis < 2 && settings.sides; ++axis) {
     prober.Tell(axis == 0 ? "the sides across x" : "the sides across y");
     const double low_m = prober.TouchSide(axis, -1);
