@@ -167,8 +167,8 @@ class SimulatedRobot : public Robot {
   void SlowTransfers(double factor) { transfer_speed_ = factor; }
   /// Motions end with kTimeLimit once Time() reaches it.
   void SetDeadline(double time_s) { memory_.deadline_s = time_s; }
-  /// Asked after every physics step of a motion, and all the while a transfer is planned: a text brings the arm to rest,
-  /// and the motion ends with kAborted and that text. Empty: nobody is asked. Asking changes nothing.
+  /// Asked after every physics step of a motion, and all the while a transfer is planned: a text brings the arm to
+  /// rest, and the motion ends with kAborted and that text. Empty: nobody is asked. Asking changes nothing.
   void SetInterruption(std::function<std::string()> interruption) { interruption_ = std::move(interruption); }
   /// `observer` sees the world every `period_s` of simulated time (frames of a video); empty: nobody does.
   void SetObserver(std::function<void(const World&)> observer, double period_s);
