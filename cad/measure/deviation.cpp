@@ -70,7 +70,7 @@ Polygon3 Shrunk(const ConvexPiece& piece, int triangle, double depth_m) {
   Polygon3 shrunk = polygon;
   for (const HalfSpace& plane : piece.planes) {
     if (plane.normal.dot(inward) < -1 + 1e-9) continue;  // its own
-    shrunk = Clip(shrunk, plane.normal, plane.offset_m - depth_m);
+    if (!IsWithin(shrunk, plane, -depth_m)) shrunk = Clip(shrunk, plane.normal, plane.offset_m - depth_m);
   }
   return shrunk.empty() ? polygon : shrunk;
 }

@@ -65,6 +65,14 @@ double PairTravel(const Triangle& a, const Triangle& b, const Eigen::Vector3d& d
   return travel;
 }
 
+/// Of the cosine between a face's outward normal and the way: 1 it faces forwards, -1 backwards, 0 it slides along.
+int Facing(const Triangle& t, const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double along = normal.dot(direction);
+  if (std::abs(along) <= kGraze * normal.norm()) return 0;
+  return along > 0 ? 1 : -1;
+}
+
 bool Pierces(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Triangle& t) {
   const Eigen::Vector3d normal = (t[1] - t[0]).cross(t[2] - t[0]);
   const double hp = normal.dot(p - t[0]);
@@ -91,6 +99,8 @@ double MeshSlide::TravelUpTo(const Eigen::Vector3d& offset_m, const Eigen::Vecto
   const Box reach = BoundsOf(target_.mesh());
   for (int s = 0; s < tool_.size(); ++s) {
     const Triangle corners = CornersOf(tool_, s, offset_m);
+    // Faces that look forwards meet faces that look against them; corners and edges that can touch belong to such.
+    if (Facing(corners, direction) <= 0) continue;
     Box box(corners[0]);
     box.extend(corners[1]);
     box.extend(corners[2]);
@@ -100,8 +110,8 @@ double MeshSlide::TravelUpTo(const Eigen::Vector3d& offset_m, const Eigen::Vecto
     if (!reach.intersects(box)) continue;
     target_.Visit(box, [&](int t) {
       const TriangleMesh& mesh = target_.mesh();
-      travel =
-          std::min(travel, PairTravel(corners, {mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)}, direction));
+      const Triangle other{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
+      if (Facing(other, direction) < 0) travel = std::min(travel, PairTravel(corners, other, direction));
       return travel > 0;
     });
     if (travel <= 0) return 0;

@@ -1,6 +1,7 @@
 #include "feeler/cad/mesh/mesh_tree.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -158,20 +159,29 @@ bool MeshTree::Inside(const Eigen::Vector3d& p) const {
 }
 
 void MeshTree::Visit(const Box& box, const std::function<bool(int)>& visit) const {
-  std::vector<int> stack;
-  if (!nodes_.empty()) stack.push_back(0);
-  while (!stack.empty()) {
-    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
-    stack.pop_back();
-    if (!node.box.intersects(box)) continue;
+  Descend([&](const Box& other) { return other.intersects(box); }, visit);
+}
+
+void MeshTree::VisitWhere(const std::function<bool(const Box&)>& meets, const std::function<bool(int)>& visit) const {
+  Descend(meets, visit);
+}
+
+template <class Meets>
+void MeshTree::Descend(const Meets& meets, const std::function<bool(int)>& visit) const {
+  std::array<int, 64> stack{};  // the tree halves: it is less than 32 deep
+  std::size_t waiting = 0;
+  if (!nodes_.empty()) stack[waiting++] = 0;
+  while (waiting > 0) {
+    const Node& node = nodes_[static_cast<std::size_t>(stack[--waiting])];
+    if (!meets(node.box)) continue;
     if (node.count == 0) {
-      stack.push_back(node.second);
-      stack.push_back(node.first);
+      stack[waiting++] = node.second;
+      stack[waiting++] = node.first;
       continue;
     }
     for (int i = node.first; i < node.first + node.count; ++i) {
       const int t = order_[static_cast<std::size_t>(i)];
-      if (BoundsOf(mesh_, t).intersects(box) && !visit(t)) return;
+      if (meets(BoundsOf(mesh_, t)) && !visit(t)) return;
     }
   }
 }

@@ -26,6 +26,8 @@ class MeshTree {
   double DistanceToSolid(const Eigen::Vector3d& p) const { return Inside(p) ? 0.0 : Distance(p); }
   /// Calls `visit` for each triangle whose box meets `box`, until it returns false.
   void Visit(const Box& box, const std::function<bool(int)>& visit) const;
+  /// The same for each whose box, and those around it, `meets` accepts.
+  void VisitWhere(const std::function<bool(const Box&)>& meets, const std::function<bool(int)>& visit) const;
 
   const TriangleMesh& mesh() const { return mesh_; }
 
@@ -36,6 +38,8 @@ class MeshTree {
     int count = 0;  ///< 0: an inner node, whose second child follows the first one's subtree
     int second = 0;
   };
+  template <class Meets>
+  void Descend(const Meets& meets, const std::function<bool(int)>& visit) const;
   int Build(int first, int count);
   int Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const;
 

@@ -1,5 +1,7 @@
 #include "feeler/cad/pieces/clip.h"
 
+#include <algorithm>
+
 namespace feeler::cad {
 
 Polygon3 Clip(const Polygon3& polygon, const Eigen::Vector3d& normal, double offset_m) {
@@ -16,8 +18,26 @@ Polygon3 Clip(const Polygon3& polygon, const Eigen::Vector3d& normal, double off
   return kept.size() < 3 ? Polygon3{} : kept;
 }
 
+bool IsWithin(const Polygon3& polygon, const HalfSpace& plane, double grow_m) {
+  return std::all_of(polygon.begin(), polygon.end(),
+                     [&](const Eigen::Vector3d& p) { return plane.normal.dot(p) - (plane.offset_m + grow_m) <= 0; });
+}
+
+namespace {
+
+bool IsBeyond(const Polygon3& polygon, const HalfSpace& plane, double grow_m) {
+  return std::all_of(polygon.begin(), polygon.end(),
+                     [&](const Eigen::Vector3d& p) { return plane.normal.dot(p) - (plane.offset_m + grow_m) > 0; });
+}
+
+}  // namespace
+
 Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m) {
   for (const HalfSpace& plane : piece.planes) {
+    if (IsBeyond(polygon, plane, grow_m)) return {};
+  }
+  for (const HalfSpace& plane : piece.planes) {
+    if (IsWithin(polygon, plane, grow_m)) continue;
     polygon = Clip(polygon, plane.normal, plane.offset_m + grow_m);
     if (polygon.empty()) break;
   }
@@ -25,6 +45,9 @@ Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m) 
 }
 
 std::vector<Polygon3> Outside(const Polygon3& polygon, const ConvexPiece& piece, double grow_m) {
+  if (std::all_of(piece.planes.begin(), piece.planes.end(),
+                  [&](const HalfSpace& plane) { return IsWithin(polygon, plane, grow_m); }))
+    return {};
   if (ClipToPiece(polygon, piece, grow_m).empty()) return {polygon};
   std::vector<Polygon3> outside;
   Polygon3 rest = polygon;

@@ -6,9 +6,11 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <unordered_map>
 
 #include "feeler/cad/mesh/mesh_tree.h"
 
@@ -56,17 +58,27 @@ bool RunQhull(std::vector<double>& coordinates, std::vector<std::array<int, 3>>&
 
 /// One plane for each direction.
 std::vector<HalfSpace> Distinct(const std::vector<HalfSpace>& planes) {
+  constexpr double kBin = 1e-6;  // of a normal's x: far more than what planes of one face differ by
+  std::unordered_map<std::int64_t, std::vector<std::size_t>> bins;
   std::vector<HalfSpace> distinct;
   for (const HalfSpace& plane : planes) {
-    bool known = false;
-    for (HalfSpace& other : distinct) {
-      if ((other.normal - plane.normal).squaredNorm() > 1e-18 || std::abs(other.offset_m - plane.offset_m) > 1e-9)
-        continue;
-      other.offset_m = std::max(other.offset_m, plane.offset_m);
-      known = true;
-      break;
+    const auto bin = static_cast<std::int64_t>(std::floor(plane.normal.x() / kBin));
+    std::size_t known = distinct.size();
+    for (const std::int64_t near : {bin - 1, bin, bin + 1}) {
+      const auto found = bins.find(near);
+      if (found == bins.end()) continue;
+      for (const std::size_t k : found->second) {
+        const HalfSpace& other = distinct[k];
+        if ((other.normal - plane.normal).squaredNorm() <= 1e-18 && std::abs(other.offset_m - plane.offset_m) <= 1e-9)
+          known = std::min(known, k);
+      }
     }
-    if (!known) distinct.push_back(plane);
+    if (known < distinct.size()) {
+      distinct[known].offset_m = std::max(distinct[known].offset_m, plane.offset_m);
+      continue;
+    }
+    bins[bin].push_back(distinct.size());
+    distinct.push_back(plane);
   }
   return distinct;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -238,11 +239,20 @@ class Merger {
 
 bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options) {
   bool inside = true;
-  solid.Visit(hull.bounds, [&](int t) {
+  // Of a thin hull nothing would be left to enter: it could close a hole.
+  const double thin = 0.2 * hull.bounds.sizes().minCoeff();
+  const double loose = std::min(thin, std::max(options.tolerance_near_m, options.tolerance_far_m));
+  const double tight = std::min({thin, options.tolerance_near_m, options.tolerance_far_m});
+  const auto enters = [&](const Box& box) {
+    const Eigen::Vector3d center = box.center();
+    const Eigen::Vector3d half = 0.5 * box.sizes();
+    return std::none_of(hull.planes.begin(), hull.planes.end(), [&](const HalfSpace& plane) {
+      return plane.normal.dot(center) - plane.normal.cwiseAbs().dot(half) > plane.offset_m - 0.9 * tight;
+    });
+  };
+  solid.VisitWhere(enters, [&](int t) {
     const TriangleMesh& mesh = solid.mesh();
     const Polygon3 triangle{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
-    const double loose = std::max(options.tolerance_near_m, options.tolerance_far_m);
-    const double tight = std::min(options.tolerance_near_m, options.tolerance_far_m);
     const Polygon3 entered = ClipToPiece(triangle, hull, -tight);
     if (entered.empty()) return true;
     inside = loose > tight && ClipToPiece(entered, hull, -loose).empty() && ClipToBox(entered, options.mating).empty();
@@ -252,8 +262,15 @@ bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const Decompose
 }
 
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options) {
+  return *DecomposeIfFew(solid, options, std::numeric_limits<std::size_t>::max());
+}
+
+std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid, const DecomposeOptions& options,
+                                                       std::size_t most_bodies) {
+  std::vector<ConvexPiece> bodies = Elementary(SlabsOf(solid, options), options);
+  if (bodies.size() > most_bodies) return std::nullopt;
   const MeshTree tree(solid);
-  return Merger(Elementary(SlabsOf(solid, options), options), tree, options).Run();
+  return Merger(std::move(bodies), tree, options).Run();
 }
 
 }  // namespace feeler::cad

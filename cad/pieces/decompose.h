@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ struct DecomposeOptions {
 /// the convex hull of two stays in the solid, within the tolerances. Exact for prisms, bores, tapers and rings along z.
 /// Same input, same pieces, bit for bit.
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options);
+/// The same, or nothing where the slices have more than `most_bodies` before they are united.
+std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid, const DecomposeOptions& options,
+                                                       std::size_t most_bodies);
 
 class MeshTree;
 

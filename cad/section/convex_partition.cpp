@@ -19,8 +19,9 @@ constexpr std::size_t kMostPartners = 16;
 constexpr double kSnap = 0.02;
 /// Between a cut and a side, where there is a choice.
 constexpr double kLeastAngle = kPi / 6;
-/// A cut whose ends are off a plane by less is plane.
+/// A cut whose ends are off a plane by less, or by this share of the tolerance, is plane.
 constexpr double kPlane_m = 2e-7;
+constexpr double kPlaneShare = 0.5;
 /// Of the directions that a cut may take, where the bisector and the prolonged sides do not do.
 constexpr std::array kFan{1.0 / 6, 1.0 / 3, 0.5, 2.0 / 3, 5.0 / 6};
 
@@ -157,7 +158,9 @@ double Squareness(double angle) { return std::max(std::sin(std::clamp(angle, 0.0
 class Cutter {
  public:
   Cutter(Region region, double tolerance_m, bool plane_only)
-      : tolerance_m_(tolerance_m), any_cut_does_(!plane_only || IsPrism(region)) {
+      : tolerance_m_(tolerance_m),
+        plane_m_(std::max(kPlane_m, kPlaneShare * tolerance_m)),
+        any_cut_does_(!plane_only || IsPrism(region)) {
     regions_.push_back(std::move(region));
   }
 
@@ -293,8 +296,8 @@ class Cutter {
     return std::all_of(kEnds.begin(), kEnds.end(), [&](Height end) {
       const Eigen::Vector2d there = b.*end - a.*end;
       const double along = there.dot(direction);
-      return std::abs(Cross(there, direction)) <= kPlane_m && along >= -kPlane_m &&
-             Shoot(region, a.*end, direction, end).distance >= along - kPlane_m;
+      return std::abs(Cross(there, direction)) <= plane_m_ && along >= -plane_m_ &&
+             Shoot(region, a.*end, direction, end).distance >= along - plane_m_;
     });
   }
 
@@ -312,18 +315,18 @@ class Cutter {
       const Eigen::Vector2d way = a.*end - from.*end;
       const Eigen::Vector2d side = b.*end - a.*end;
       const double across = Cross(direction, side);
-      if (side.norm() <= kPlane_m) {
-        if (std::abs(Cross(way, direction)) > kPlane_m) return std::nullopt;
+      if (side.norm() <= plane_m_) {
+        if (std::abs(Cross(way, direction)) > plane_m_) return std::nullopt;
         point.*end = a.*end;
       } else {
         if (across <= 0) return std::nullopt;
         const double share = Cross(way, direction) / across;
-        const double slack = kPlane_m / side.norm();
+        const double slack = plane_m_ / side.norm();
         if (share < -slack || share > 1 + slack) return std::nullopt;
         point.*end = a.*end + std::clamp(share, 0.0, 1.0) * side;
       }
       const double along = (point.*end - from.*end).dot(direction);
-      if (along < -kPlane_m || Shoot(region, from.*end, direction, end).distance < along - kPlane_m)
+      if (along < -plane_m_ || Shoot(region, from.*end, direction, end).distance < along - plane_m_)
         return std::nullopt;
     }
     return point;
@@ -415,6 +418,7 @@ class Cutter {
 
  private:
   double tolerance_m_;
+  double plane_m_;
   bool any_cut_does_;
   bool stuck_ = false;
   std::vector<Region> regions_;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -32,6 +33,7 @@ constexpr double kLargestPart_m = 1.0;
 constexpr double kSmallestPart_m = 2e-4;
 constexpr std::size_t kMostPieces = 64;
 constexpr std::size_t kMostPiecesOfBore = 512;
+constexpr std::size_t kMostBodies = 8;  ///< for each piece that there may be
 constexpr double kLargestFarDeviation_m = 5e-4;
 constexpr int kSamples = 100'000;
 
@@ -135,14 +137,20 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
     decompose.mating = mating.mating_box;
     decompose.tolerance_near_m = step.near_m;
     decompose.tolerance_far_m = step.far_m;
+    // Slices of so many bodies seldom unite to few enough, and it takes long to see that.
+    const std::size_t most_bodies =
+        &step == &ladder.back() ? std::numeric_limits<std::size_t>::max() : kMostBodies * most;
     part.pieces.clear();
+    bool all = true;
     for (const cad::TriangleMesh& solid : part.checked.solids) {
-      for (cad::ConvexPiece& piece : cad::Decompose(cad::Transformed(solid, frame_T_cad), decompose))
-        part.pieces.push_back(std::move(piece));
+      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies);
+      all = pieces.has_value();
+      if (!all) break;
+      for (cad::ConvexPiece& piece : *pieces) part.pieces.push_back(std::move(piece));
     }
     part.tolerance_near_m = step.near_m;
     part.tolerance_far_m = step.far_m;
-    if (part.pieces.size() <= most) break;
+    if (all && part.pieces.size() <= most) break;
   }
   if (part.pieces.empty()) throw InputError(role, "no convex piece has a volume", "is the part thinner than 2 um?");
   if (part.pieces.size() > kMostPiecesOfBore) {
