@@ -57,9 +57,11 @@ ImportedPart ReadAndCheck(const std::string& source_text, const std::string& rol
   part.hash = HashOf(source.file);
   part.format = raw.format;
   const cad::UnitGuess guess = cad::GuessUnit(raw);
-  const cad::Unit unit = options.unit.empty() ? guess.unit : cad::ParseUnit(options.unit);
+  // A STEP file always says; of a 3MF file the unit is not read.
+  const bool given = !options.unit.empty() && raw.format != "STEP";
+  const cad::Unit unit = given ? cad::ParseUnit(options.unit) : guess.unit;
   part.unit = unit.name;
-  part.unit_reason = options.unit.empty() ? guess.reason : "given (--unit)";
+  part.unit_reason = given ? "given (--unit)" : guess.reason;
   const std::string where = fmt::format("{} ({})", role, part.file);
   const cad::TriangleMesh mesh = cad::InMetres(raw, unit);
   const double size = cad::BoundsOf(cad::Welded(mesh, 1e-9)).diagonal().norm();

@@ -61,6 +61,14 @@ TEST_F(ImportTaskTest, TheStartIsAsFarAsATransferKeepsClear) {
   EXPECT_GE(model.task.start_offset_m.z() - highest_m, 0.004);
 }
 
+TEST_F(ImportTaskTest, AUnitIsGivenToFilesThatDoNotSay) {
+  ImportOptions options = OptionsFor("keyed", "step");
+  options.unit = "in";
+  const ImportedTask task = ImportTask(options);
+  EXPECT_EQ(task.tool.unit, "mm");
+  EXPECT_NEAR(task.mating.depth_m, 0.012, 1e-5);
+}
+
 TEST(TrialVerdict, SaysWhyNothingWasInserted) {
   Trial trial;
   trial.solved = trial.verified = true;
