@@ -33,8 +33,9 @@ struct CalibrationSettings {
 /// Touches the block with a tool that stands above it, axes parallel to the base frame: sensor bias and noise at rest,
 /// the tool centre point (the heights at three places on top; the middles between opposite sides, where the width of
 /// the tool cancels), the stiffness of a contact (pressed by small steps: force over depth at rest) and the reaction
-/// time (two speeds, two peaks); the last two are left out where they cannot be told. Throws InputError for settings that measure
-/// nothing, WorldError where a touch does not meet the block, the robot refuses, or what comes out cannot be.
+/// time (two speeds, two peaks); the last two are left out where they cannot be told. Throws InputError for settings
+/// that measure nothing, WorldError where a touch does not meet the block, the robot refuses, or what comes out cannot
+/// be.
 CellFile Calibrate(Robot& robot, const KnownBlock& block, const CalibrationSettings& settings = {});
 
 }  // namespace feeler::execution
