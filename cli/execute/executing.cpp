@@ -33,13 +33,13 @@ constexpr double kRedial_s = 10.0;
 /// A sensor that tells contacts late may raise the force budget of the task so many times, unasked.
 constexpr double kMostRise = 2.0;
 
-std::string UtcNow() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
-
 execution::CellFile CellOf(const ExecuteFlags& flags) {
   return flags.cell.empty() ? execution::CellFile{} : execution::ReadCellFile(flags.cell);
 }
 
 }  // namespace
+
+std::string Executing::UtcNow() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 Executing::Executing(const ExecuteFlags& flags, const Session& session)
     : flags_(flags),
@@ -336,7 +336,7 @@ std::optional<ExecutedEpisode> Executing::RunNext() {
   line.task = bundle_.task.name;
   line.noise = told->noise;
   line.dry = flags_.dry_run;
-  if (!welcome().simulated) line.started = UtcNow();
+  if (!welcome().simulated) line.started = begun_;
   line.seed = told->seed;
   line.episode = told->episode;
   line.placement = told->placement;

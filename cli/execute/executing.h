@@ -51,6 +51,7 @@ class Executing {
   void Bye() { robot_->Bye(); }
 
  private:
+  static std::string UtcNow();
   execution::RemoteOptions WayToRobot() const;
   bool Redial();
   /// Asks the operator until a protective stop is recovered from. Throws NegativeResult where nobody does.
@@ -79,6 +80,7 @@ class Executing {
   std::unique_ptr<execution::RemoteRobot> robot_;
   std::optional<execution::ArmCheck> arm_;
   std::optional<planner::Extents> asked_;  ///< --extents
+  std::string begun_ = UtcNow();           ///< when this object was made
   bool started_ = false;
   std::int64_t done_ = 0;
 };

@@ -5,13 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feeler/execution/remote/robot_server.h"
+
 namespace feeler::execution {
 namespace {
 
-/// A force that no motion reaches stands for "not watched": a retreat begins in contact.
-constexpr double kUnwatched_n = 1e5;
 /// A pose that the robot reports may lie so far outside of the box that it is led back in.
 constexpr double kRounding_m = 1e-6;
+
+/// Why no arm can be that stiff or turn that fast; empty: it may.
+std::string AboveMost(const char* what, const char* unit, double asked, double most) {
+  return asked <= most ? "" : fmt::format("a {} of {:g} {} is above {:g}", what, asked, unit, most);
+}
 
 std::string PlaceText(const Eigen::Vector3d& p) { return fmt::format("{:.3f} {:.3f} {:.3f} m", p.x(), p.y(), p.z()); }
 
@@ -32,7 +37,7 @@ std::string Describe(const PlannedMotion& motion, const Pose& world_T_tool) {
   }
   text += fmt::format(" {:.1f} mm", 1e3 * motion.length_m);
   if (motion.speed_m_s > 0.0) text += fmt::format(" at {:.0f} mm/s", 1e3 * motion.speed_m_s);
-  if (motion.force_n > 0.0 && motion.force_n < kUnwatched_n) text += fmt::format(" until {:.1f} N", motion.force_n);
+  if (motion.force_n > 0.0 && motion.force_n < kNotWatched_n) text += fmt::format(" until {:.1f} N", motion.force_n);
   return text + " to " + PlaceText(motion.world_T_end.translation());
 }
 
@@ -58,7 +63,7 @@ std::string CheckedRobot::FaultOf(const PlannedMotion& motion, double watched_fo
   if (motion.speed_m_s > robot.max_speed_m_s * (1.0 + 1e-9)) {
     return fmt::format("{:.3f} m/s is above what the robot states, {:.3f} m/s", motion.speed_m_s, robot.max_speed_m_s);
   }
-  if (watched_force_n > 0.0 && watched_force_n < kUnwatched_n && watched_force_n > limits_.force_budget_n) {
+  if (watched_force_n > 0.0 && watched_force_n < kNotWatched_n && watched_force_n > limits_.force_budget_n) {
     return fmt::format("a contact force of {:.1f} N is above the force budget of {:.1f} N", watched_force_n,
                        limits_.force_budget_n);
   }
@@ -119,9 +124,16 @@ MotionResult CheckedRobot::Compliant(const CompliantMotion& motion) {
   }
   PlannedMotion planned{"compliant",      Pose::Identity(),     length_m,
                         scaled.speed_m_s, motion.force_limit_n, motion.world_T_tool};
-  if (planned.via.empty()) return robot_.Compliant(scaled);  // which says what it thinks of no way
-  planned.world_T_end = planned.via.back();
-  planned.via.pop_back();
+  if (refusal_.empty()) {
+    refusal_ = AboveMost("stiffness", "N/m", motion.stiffness_n_m.maxCoeff(), kMostStiffness_n_m) +
+               AboveMost("rotational stiffness", "Nm/rad", motion.rotational_stiffness_nm_rad,
+                         kMostRotationalStiffness_nm_rad);
+  }
+  if (planned.via.empty() && refusal_.empty()) return robot_.Compliant(scaled);  // which says what it thinks of no way
+  if (!planned.via.empty()) {
+    planned.world_T_end = planned.via.back();
+    planned.via.pop_back();
+  }
   if (const auto refused = Check(planned, 0.0, true)) return *refused;
   return robot_.Compliant(scaled);
 }
@@ -133,6 +145,9 @@ MotionResult CheckedRobot::FollowTwist(const TwistMotion& motion) {
   Pose end = ToolPose();
   end.translation() += motion.duration_s * (end.linear() * motion.tool_T_frame.linear() * scaled.linear_m_s);
   const double speed_m_s = scaled.linear_m_s.norm();
+  if (refusal_.empty()) {
+    refusal_ = AboveMost("turning rate", "rad/s", scaled.angular_rad_s.norm(), kMostRate_rad_s);
+  }
   const PlannedMotion planned{"twist", end, motion.duration_s * speed_m_s, speed_m_s, motion.contact_force_n, {}};
   if (const auto refused = Check(planned, motion.contact_force_n, true)) return *refused;
   return robot_.FollowTwist(scaled);

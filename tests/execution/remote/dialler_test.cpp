@@ -23,8 +23,10 @@ SessionEnd DialIn(int port, const std::string& token) {
   PointRobot robot;
   ServerOptions options;
   options.token = token;
-  options.lockstep = true;
-  RobotServer server(robot.Served(), options);
+  options.lockstep = true;  // for simulations alone
+  ServedRobot served = robot.Served();
+  served.begin_episode = [](const EpisodeRequest&) { return EpisodeReply{}; };
+  RobotServer server(served, options);
   return server.Serve(Connect({"127.0.0.1", port}, 5.0));
 }
 

@@ -603,6 +603,13 @@ TEST(WireChecks, AMotionOutsideOfTheLimitsIsNotSent) {
   EXPECT_NE(refusal([](SafetyLimits& l) { l.way_fault = [](const PlannedWay&) { return "singular"; }; }, down)
                 .find("singular"),
             std::string::npos);
+  const auto stiff = [](Robot& robot) {
+    CompliantMotion motion;
+    motion.world_T_tool = {robot.ToolPose()};
+    motion.stiffness_n_m.x() = 1e12;
+    return robot.Compliant(motion);
+  };
+  EXPECT_NE(refusal(none, stiff).find("stiffness of 1e+12"), std::string::npos);
   const auto through = [](Robot& robot) {
     CompliantMotion motion;
     motion.world_T_tool = {MakePose(Eigen::Vector3d(0.0, 0.5, 0.1)), MakePose(Eigen::Vector3d(0.0, 0.0, 0.09))};
