@@ -29,6 +29,7 @@ struct CellFlags {
   std::string box;
   std::string tool;
   std::string token_file;
+  double link_timeout_s = execution::kLinkTimeout_s;
   std::string out;
   std::string recover = "ask";
   double speed = 1.0;
@@ -102,6 +103,7 @@ void Calibrate(const CellFlags& flags, Session& session) {
   execution::RemoteOptions remote;
   remote.token = execution::ReadTokenFile(flags.token_file);
   remote.form = flags.wire == "numbers" ? execution::WireForm::kNumbers : execution::WireForm::kJson;
+  remote.link_timeout_s = flags.link_timeout_s;
   remote.cancellation = session.cancellation;
   execution::Dialler dialler("--robot", flags.robot, remote, tell);
   const std::unique_ptr<execution::RemoteRobot> robot = DialRobot(flags, dialler, session);
@@ -145,6 +147,8 @@ void AddCellCommand(CLI::App& app, Session& session) {
       ->add_option("--tool", flags->tool,
                    "the task whose tool is held, or its database or bundle; its name goes into the cell file")
       ->required();
+  AddReal(*calibrate, "--link-timeout", flags->link_timeout_s, 0.02, 60.0,
+          "a robot that may be silent for longer is refused, s (simulations say themselves)");
   calibrate->add_option("--token-file", flags->token_file, "file with the token that the robot asks for");
   AddReal(*calibrate, "--reach", flags->settings.reach_m, 0.001, 0.3,
           "from a side to the tool while it stands beside, m");

@@ -38,7 +38,7 @@ def run(build, folder):
         calibrate = subprocess.Popen(
             [os.path.join(build, "feeler"), "cell", "calibrate", "--robot", f"listen:127.0.0.1:{own_port}", "--wire",
              "numbers", "--token-file", token, "--tool", "plug", "--block", "0.635,-0.012,0.1,0.665,0.012,0.2",
-             "--top-only", "--start", "--json", "--out", out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+             "--top-only", "--start", "--link-timeout", "10", "--json", "--out", out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         controller = Controller(arm, "127.0.0.1", own_port)
         for _ in Interpreter(script, controller.primitives()).steps():
             if arm.protective or calibrate.poll() is not None:
