@@ -47,6 +47,7 @@ std::vector<std::uint8_t> AbsorbingStates(const Pomdp& pomdp) {
 
 std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<bool()>& stop) {
   const std::size_t count = pomdp.state_count();
+  if (count == 0) return {};
   const std::size_t rows = pomdp.transitions.size();
   std::vector<std::size_t> begin(count + 1, 0);  // of the rows that lead to a state
   for (const SparseEntry& next : pomdp.transitions.entries) ++begin[next.index + 1];
