@@ -40,8 +40,10 @@ class Cell {
     server = std::make_unique<RobotServer>(served, options);
     thread_ = std::thread([this] {
       while (!ending_.cancelled()) {
-        if (auto connection = listener_.Accept(0.02))
-          ends.push_back(server->Serve(std::move(*connection), &listener_, &ending_));
+        auto connection = listener_.Accept(0.02);
+        if (!connection) continue;
+        ends.push_back(server->Serve(std::move(*connection), &listener_, &ending_));
+        ++served;
       }
     });
   }
@@ -50,6 +52,10 @@ class Cell {
     ending_.Cancel();
     if (thread_.joinable()) thread_.join();
   }
+  /// So many sessions are over: who dials in now is not told "busy".
+  void AwaitServed(int count) const {
+    while (served < count) std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
   Connection Dial() const { return Connect({"127.0.0.1", listener_.port()}, 5.0); }
   std::unique_ptr<RemoteRobot> Remote(const std::string& token = "") const {
     RemoteOptions options;
@@ -57,6 +63,7 @@ class Cell {
     return std::make_unique<RemoteRobot>(Dial(), options);
   }
 
+  std::atomic<int> served{0};
   PointRobot robot;
   std::unique_ptr<RobotServer> server;
   std::vector<SessionEnd> ends;
@@ -262,7 +269,8 @@ TEST(WireSession, ATokenThatBeginsWithZerosIsANumber) {
   ServerOptions options;
   options.token = "007";
   Cell cell(options);
-  const auto answer = [&](const std::string& hello) {
+  const auto answer = [&, asked = 0](const std::string& hello) mutable {
+    cell.AwaitServed(asked++);
     Connection connection = cell.Dial();
     return Ask(connection, hello);
   };
@@ -349,6 +357,7 @@ TEST(WireFuzz, NoFrameMovesARobot) {
   std::mt19937 random(5);
   constexpr int kFramesASession = 20;
   for (int session = 0; session < Frames() / kFramesASession; ++session) {
+    cell.AwaitServed(session);
     Connection connection = cell.Dial();
     if (session % 2 == 0) connection.Write(Hello() + "\n");
     // Starts are left out: without one every motion is refused, however sound the frame.
