@@ -43,7 +43,7 @@ class Cell {
         auto connection = listener_.Accept(0.02);
         if (!connection) continue;
         ends.push_back(server->Serve(std::move(*connection), &listener_, &ending_));
-        ++served;
+        ++over;
       }
     });
   }
@@ -54,7 +54,7 @@ class Cell {
   }
   /// So many sessions are over: who dials in now is not told "busy".
   void AwaitServed(int count) const {
-    while (served < count) std::this_thread::sleep_for(std::chrono::microseconds(100));
+    while (over < count) std::this_thread::sleep_for(std::chrono::microseconds(100));
   }
   Connection Dial() const { return Connect({"127.0.0.1", listener_.port()}, 5.0); }
   std::unique_ptr<RemoteRobot> Remote(const std::string& token = "") const {
@@ -63,7 +63,7 @@ class Cell {
     return std::make_unique<RemoteRobot>(Dial(), options);
   }
 
-  std::atomic<int> served{0};
+  std::atomic<int> over{0};  ///< sessions
   PointRobot robot;
   std::unique_ptr<RobotServer> server;
   std::vector<SessionEnd> ends;
@@ -269,7 +269,7 @@ TEST(WireSession, ATokenThatBeginsWithZerosIsANumber) {
   ServerOptions options;
   options.token = "007";
   Cell cell(options);
-  const auto answer = [&, asked = 0](const std::string& hello) mutable {
+  auto answer = [&, asked = 0](const std::string& hello) mutable {
     cell.AwaitServed(asked++);
     Connection connection = cell.Dial();
     return Ask(connection, hello);
