@@ -10,6 +10,9 @@
 
 namespace feeler::execution {
 
+/// Straight down at 50 mm/s, watched.
+inline GuardedMotion Down(double distance_m = 0.05) { return {-Eigen::Vector3d::UnitZ(), distance_m, 0.05, 5.0}; }
+
 /// A point above a floor at z = 0, moved a millisecond at a time on its own clock; it asks whether to go on, as a
 /// served robot must.
 class PointRobot final : public Robot {

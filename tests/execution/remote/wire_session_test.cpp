@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "feeler/core/error.h"
-#include "feeler/execution/remote/checked_robot.h"
 #include "feeler/execution/remote/remote_robot.h"
 #include "feeler/execution/remote/robot_server.h"
 #include "tests/execution/remote/point_robot.h"
@@ -73,8 +72,6 @@ class Cell {
   CancellationToken ending_;
   std::thread thread_;
 };
-
-GuardedMotion Down(double distance_m = 0.05) { return {-Eigen::Vector3d::UnitZ(), distance_m, 0.05, 5.0}; }
 
 std::string Ask(Connection& connection, const std::string& line) {
   connection.Write(line + "\n");
@@ -372,145 +369,6 @@ TEST(WireFuzz, NoFrameMovesARobot) {
   EXPECT_EQ(cell.robot.moved_steps, 0);
 }
 
-/// A robot of one session, in a thread, that answers as it is told.
-class Teller {
- public:
-  Teller(WelcomeReply welcome, std::function<Reply(const Request&)> answer, std::uint64_t welcome_seq = 0)
-      : listener_("--listen", {"127.0.0.1", 0}),
-        thread_([this, welcome = std::move(welcome), answer = std::move(answer), welcome_seq] {
-          std::optional<Connection> connection = listener_.Accept(5.0);
-          std::string line;
-          if (!connection || connection->ReadLine(line, 5.0) != LineStatus::kLine) return;
-          connection->Write(EncodeReply(WireForm::kJson, welcome_seq, welcome) + "\n");
-          while (connection->ReadLine(line, 5.0) == LineStatus::kLine) {
-            const Framed<Request> request = DecodeRequest(WireForm::kJson, line);
-            if (IsMotion(request.body)) ++motions;
-            if (request.seq != 0)
-              connection->Write(EncodeReply(WireForm::kJson, request.seq, answer(request.body)) + "\n");
-          }
-        }) {}
-  std::unique_ptr<RemoteRobot> Remote(RemoteOptions options = {}) const {
-    return std::make_unique<RemoteRobot>(Connect({"127.0.0.1", listener_.port()}, 5.0), options);
-  }
-  std::atomic<int> motions{0};
-
- private:
-  Listener listener_;
-  std::jthread thread_;
-};
-
-WelcomeReply Welcome(bool simulated = true) {
-  WelcomeReply welcome;
-  welcome.robot = "teller";
-  welcome.simulated = welcome.lockstep = simulated;
-  welcome.capabilities.motions = {"transfer", "linear", "guarded", "compliant"};
-  return welcome;
-}
-
-Reply Ready(const Request& /*request*/) { return StateReply{}; }
-
-TEST(WireSession, ARobotThatCannotBeTrustedIsRefusedAtHello) {
-  const auto refused = [](const std::function<void(WelcomeReply&)>& change, const std::string& word,
-                          const RemoteOptions& options = {}, std::uint64_t seq = 0) {
-    WelcomeReply welcome = Welcome(false);
-    change(welcome);
-    Teller teller(welcome, Ready, seq);
-    try {
-      teller.Remote(options);
-      ADD_FAILURE() << word;
-    } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
-    }
-    EXPECT_EQ(teller.motions, 0);
-  };
-  refused([](WelcomeReply& w) { w.lockstep = true; }, "lockstep");
-  refused([](WelcomeReply& w) { w.link_timeout_s = 60.0; }, "silent for 60 s");
-  refused([](WelcomeReply& w) { w.capabilities.contact_force_n = 1e9; }, "tells contacts from");
-  refused([](WelcomeReply&) {}, "number 5", {}, 5);
-  RemoteOptions slow;
-  slow.heartbeat_s = 0.5;
-  refused([](WelcomeReply&) {}, "--heartbeat", slow);
-  RemoteOptions patient;
-  patient.link_timeout_s = 60.0;
-  WelcomeReply silent = Welcome(false);
-  silent.link_timeout_s = 30.0;
-  Teller teller(silent, Ready);
-  EXPECT_NO_THROW(teller.Remote(patient)) << "as the operator allows";
-}
-
-TEST(WireSession, ARobotThatIsNotReadyGetsNoMotion) {
-  const auto in_mode = [](RobotMode mode) {
-    return [mode](const Request& request) -> Reply {
-      RobotState state;
-      state.mode = mode;
-      if (IsMotion(request)) return ResultReply{{}, state};
-      return StateReply{state};
-    };
-  };
-  for (const RobotMode mode : {RobotMode::kWaiting, RobotMode::kProtectiveStop, RobotMode::kFault}) {
-    Teller teller(Welcome(), in_mode(mode));
-    const auto remote = teller.Remote();
-    EXPECT_THROW(remote->Start(), WorldError) << ToString(mode);
-    if (mode == RobotMode::kWaiting) continue;
-    EXPECT_EQ(remote->Guarded(Down()).reason, StopReason::kAborted);
-    EXPECT_EQ(teller.motions, 0) << ToString(mode);
-  }
-}
-
-TEST(WireSession, AMotionThatCannotHaveEndedSoEndsTheSession) {
-  const auto ended = [](const std::function<void(ResultReply&)>& change) {
-    Teller teller(Welcome(), [&](const Request& request) -> Reply {
-      if (!IsMotion(request)) return StateReply{};
-      ResultReply result;
-      result.result.world_T_tool.translation() = Eigen::Vector3d(0.0, 0.0, -0.02);
-      result.result.travelled_m = 0.02;
-      change(result);
-      result.state.world_T_tool = result.result.world_T_tool;
-      return result;
-    });
-    const auto remote = teller.Remote();
-    remote->Start();
-    const MotionResult first = remote->Guarded(Down(0.02));
-    EXPECT_EQ(remote->lost().empty(), first.reason == StopReason::kReached);
-    EXPECT_EQ(remote->spoke_nonsense(), !remote->lost().empty());
-    const std::string lost = remote->lost();
-    if (!lost.empty()) remote->Guarded(Down(0.02));
-    EXPECT_EQ(teller.motions, 1) << "no motion after it";
-    return lost;
-  };
-  EXPECT_EQ(ended([](ResultReply&) {}), "");
-  EXPECT_NE(ended([](ResultReply& r) { r.result.world_T_tool = Pose::Identity(); }).find("'reached'"),
-            std::string::npos);
-  EXPECT_NE(ended([](ResultReply& r) {
-              r.result.world_T_tool.linear() = Eigen::AngleAxisd(3.0, Eigen::Vector3d::UnitX()).toRotationMatrix();
-            }).find("turned"),
-            std::string::npos);
-  EXPECT_NE(ended([](ResultReply& r) {
-              r.result.reason = StopReason::kContact;
-              r.result.world_T_tool.translation().z() = 0.02;
-            }).find("other way"),
-            std::string::npos);
-  EXPECT_NE(ended([](ResultReply& r) { r.result.travelled_m = -5000.0; }).find("travelled"), std::string::npos);
-}
-
-TEST(WireSession, WhatWasMeasuredOfContactsStandsAboveWhatTheRobotSays) {
-  const auto told = [](const Request& request) -> Reply {
-    if (std::holds_alternative<ContactRequest>(request)) return ErrorReply{"refused", "\x1b[31mno\nidea"};
-    return StateReply{};
-  };
-  WelcomeReply welcome = Welcome();
-  welcome.capabilities.effective_mass_kg = 7.0;
-  welcome.capabilities.reaction_time_s = 0.03;
-  Teller teller(welcome, told);
-  RemoteOptions options;
-  options.measured.stiffness_n_m = 1234.0;
-  const auto remote = teller.Remote(options);
-  const ContactResponse contact = remote->Contact(Eigen::Vector3d::UnitX());
-  EXPECT_EQ(contact.held_mass_kg, 7.0);
-  EXPECT_EQ(contact.reaction_time_s, 0.03);
-  EXPECT_EQ(contact.stiffness_n_m, 1234.0);
-}
-
 /// The robot's side of a session that says nonsense now and then. Returns how many frames it said; `after`: requests
 /// that came after it had said what is no sound reply.
 int TalkNonsense(Connection connection, std::mt19937& random, int& after) {
@@ -579,55 +437,6 @@ TEST(WireFuzz, AnExecutorThatHeardNonsenseAsksForNoMotion) {
   robot.join();
   EXPECT_EQ(after, 0);
   EXPECT_GT(lost, sessions / 2) << "the nonsense is heard";
-}
-
-TEST(WireChecks, AMotionOutsideOfTheLimitsIsNotSent) {
-  const auto refusal = [](const std::function<void(SafetyLimits&)>& limit,
-                          const std::function<MotionResult(Robot&)>& move) {
-    PointRobot robot;
-    SafetyLimits limits;
-    limits.robot.max_speed_m_s = 0.5;
-    limit(limits);
-    CheckedRobot checked(robot, limits);
-    const MotionResult result = move(checked);
-    const bool still = robot.moved_steps == 0;
-    EXPECT_EQ(result.reason == StopReason::kUnplanned, still);
-    EXPECT_EQ(checked.Guarded(Down(0.001)).reason == StopReason::kUnplanned, still) << "it goes on after a refusal";
-    return checked.refusal();
-  };
-  const auto none = [](SafetyLimits&) {};
-  const auto down = [](Robot& robot) { return robot.Guarded(Down()); };
-  EXPECT_EQ(refusal(none, down), "");
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.box.min_m.z() = 0.06; }, down).find("workspace box"), std::string::npos);
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.force_budget_n = 4.0; }, down).find("force budget"), std::string::npos);
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.robot.max_speed_m_s = 0.04; }, down).find("above what the robot states"),
-            std::string::npos);
-  EXPECT_EQ(refusal(
-                [](SafetyLimits& l) {
-                  l.robot.max_speed_m_s = 0.04;
-                  l.speed_scale = 0.5;
-                },
-                down),
-            "");
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.way_fault = [](const PlannedWay&) { return "singular"; }; }, down)
-                .find("singular"),
-            std::string::npos);
-  const auto stiff = [](Robot& robot) {
-    CompliantMotion motion;
-    motion.world_T_tool = {robot.ToolPose()};
-    motion.stiffness_n_m.x() = 1e12;
-    return robot.Compliant(motion);
-  };
-  EXPECT_NE(refusal(none, stiff).find("stiffness of 1e+12"), std::string::npos);
-  const auto through = [](Robot& robot) {
-    CompliantMotion motion;
-    motion.world_T_tool = {MakePose(Eigen::Vector3d(0.0, 0.5, 0.1)), MakePose(Eigen::Vector3d(0.0, 0.0, 0.09))};
-    return robot.Compliant(motion);
-  };
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.box.max_m.y() = 0.4; }, through).find("workspace box"), std::string::npos)
-      << "a way point between the ends counts";
-  EXPECT_NE(refusal([](SafetyLimits& l) { l.most_compliant_n = 50.0; }, through).find("force limit"),
-            std::string::npos);
 }
 
 }  // namespace
