@@ -16,7 +16,8 @@ target_compile_options(feeler_options INTERFACE -Wall -Wextra -Wshadow -Wpedanti
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC 12 reports false overlaps in `"text" + std::string` (GCC bug 105651) and false sizes in comparisons of byte
   # vectors (GCC bug 107852).
-  target_compile_options(feeler_options INTERFACE -Wno-restrict -Wno-stringop-overread)
+  # The default collects garbage of the compiler every few ten MB: a twentieth of the time.
+  target_compile_options(feeler_options INTERFACE -Wno-restrict -Wno-stringop-overread --param=ggc-min-heapsize=524288)
 endif()
 if(FEELER_WERROR)
   target_compile_options(feeler_options INTERFACE -Werror)
@@ -28,9 +29,10 @@ if(FEELER_SANITIZE)
   target_link_options(feeler_options INTERFACE -fsanitize=${FEELER_SANITIZE})
 endif()
 
-# feeler_unity(TARGET SOURCE...): one translation unit a folder. Most of the time goes into the same templates (Eigen,
+# feeler_unity(TARGET HEADERS SOURCE...): one translation unit a folder, and what nearly every folder includes parsed once:
+# HEADERS is the target whose precompiled headers it takes ("": none). Most of the time goes into the same templates (Eigen,
 # JSON, the standard library), file after file.
-function(feeler_unity target)
+function(feeler_unity target headers)
   if(NOT FEELER_UNITY)
     return()
   endif()
@@ -41,18 +43,48 @@ function(feeler_unity target)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
   endforeach()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  if(headers)
+    target_precompile_headers(${target} REUSE_FROM ${headers})
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # Warnings about what only one source file knows, seen from another: `dev` and the lint compile files one by one.
-    target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow)
+    # Warnings about what only one source file knows, seen from another, and those of GCC bug 105651 where the headers
+    # are precompiled: `dev` and the lint compile files one by one.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage -Wno-shadow -Wno-array-bounds -Wno-stringop-overflow)
   endif()
 endfunction()
 
+# feeler_headers(NAME LINKS ... HEADERS ... OPTIONS ...): precompiled headers for feeler_unity. OPTIONS are how the targets
+# that take them are compiled: others would not fit.
+function(feeler_headers name)
+  cmake_parse_arguments(arg "" "" "LINKS;HEADERS;OPTIONS" ${ARGN})
+  file(WRITE ${PROJECT_BINARY_DIR}/${name}.cpp "// Nothing: ${name} is its headers.\n")
+  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/${name}.cpp)
+  target_compile_features(${name} PUBLIC cxx_std_20)
+  target_compile_options(${name} PRIVATE ${arg_OPTIONS})
+  target_link_libraries(${name} PRIVATE feeler_options ${arg_LINKS})
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
+endfunction()
+
+# What is compiled more often than its own code runs long: commands, reports, tests.
+set(FEELER_LIGHT $<$<OR:$<CONFIG:Release>,$<CONFIG:RelWithDebInfo>>:-O1>)
+
 set(FEELER_COMPONENTS "" CACHE INTERNAL "Installed rooms")
+
+# How rooms are compiled that a shared library can take in.
+function(feeler_as_library target)
+  if(FEELER_PIC OR BUILD_SHARED_LIBS)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
+  if(FEELER_PIC)
+    # Nobody replaces our functions at run time: the compiler may inline them as in a program.
+    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+  endif()
+endfunction()
 
 # feeler_target(NAME SOURCES ... ROOMS ... LIBRARIES ... LINKS ...): library feeler_NAME, feeler::NAME to its users.
 # ROOMS: what it uses of ours; LIBRARIES: names of feeler_find_dependency; LINKS: their targets.
 function(feeler_target name)
-  cmake_parse_arguments(arg "NO_INSTALL;NO_UNITY" "" "SOURCES;ROOMS;LIBRARIES;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "NO_INSTALL" "" "SOURCES;ROOMS;LIBRARIES;LINKS" ${ARGN})
   add_library(feeler_${name} ${arg_SOURCES})
   add_library(feeler::${name} ALIAS feeler_${name})
   set(links ${arg_ROOMS})
@@ -64,13 +96,16 @@ function(feeler_target name)
   target_link_libraries(feeler_${name} PUBLIC ${links} PRIVATE $<BUILD_INTERFACE:feeler_options>)
   set_target_properties(feeler_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
                         SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
-  if(FEELER_PIC AND NOT arg_NO_INSTALL)
-    # Nobody replaces our functions at run time: the compiler may inline them as in a program.
-    set_target_properties(feeler_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-    target_compile_options(feeler_${name} PRIVATE -fno-semantic-interposition)
-  endif()
-  if(NOT arg_NO_UNITY)
-    feeler_unity(feeler_${name} ${arg_SOURCES})
+  if(arg_NO_INSTALL)
+    target_compile_options(feeler_${name} PRIVATE ${FEELER_LIGHT})
+    feeler_unity(feeler_${name} feeler_cli_headers ${arg_SOURCES})
+  else()
+    feeler_as_library(feeler_${name})
+    set(headers "")
+    if(arg_ROOMS)  # core uses none of them
+      set(headers feeler_room_headers)
+    endif()
+    feeler_unity(feeler_${name} "${headers}" ${arg_SOURCES})
   endif()
   if(NOT arg_NO_INSTALL)
     feeler_install_component(${name} "${arg_ROOMS}" "${arg_LIBRARIES}")
@@ -94,12 +129,11 @@ function(feeler_tests room)  # the tests of `cli` run the binary
   endif()
   add_executable(${room}_tests EXCLUDE_FROM_ALL ${sources})
   add_dependencies(tests ${room}_tests)
-  feeler_unity(${room}_tests ${sources})
+  feeler_unity(${room}_tests feeler_test_headers ${sources})
   target_link_libraries(${room}_tests PRIVATE feeler_options ${ARGN} GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")
-  # A test is compiled more often than its own code runs long; what it tests is in the rooms, optimised in full.
-  target_compile_options(${room}_tests PRIVATE $<$<OR:$<CONFIG:Release>,$<CONFIG:RelWithDebInfo>>:-O1>)
+  target_compile_options(${room}_tests PRIVATE ${FEELER_LIGHT})
   if(room STREQUAL cli)
     add_dependencies(cli_tests feeler)
   endif()

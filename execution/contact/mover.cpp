@@ -134,7 +134,9 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
   double speed_m_s = options_.transfer_speed_m_s;
   if (!way.isZero()) {
     if (unfelt_ && DirectionOf(way) == unfelt_) speed_m_s = std::min(speed_m_s, kUnfelt_m_s);
-    if (record_.startled > 0) {
+    if (free_by != FreeBy::kInside && StaysOut(target)) {
+      // Whatever was met is below.
+    } else if (record_.startled > 0) {
       --record_.startled;
       speed_m_s = std::min(speed_m_s, SpeedOfCarefulWay(way.normalized()));
     } else if (record_.careful || free_by != FreeBy::kBelief) {
@@ -224,6 +226,13 @@ double Mover::SpeedOfCarefulWay(const Eigen::Vector3d& way) const {
       speed_m_s = std::min(speed_m_s, SpeedOfProbe(in_world, ahead, {false, UnitVector(face)}));
   }
   return speed_m_s;
+}
+
+bool Mover::StaysOut(const Eigen::Vector3d& target) const {
+  if (!outmost_) return false;
+  const int axis = AxisOf(outmost_->first);
+  const double out = -SignOf(outmost_->first);
+  return std::min(out * position_[axis], out * target[axis]) >= out * outmost_->second;
 }
 
 double Mover::SpeedInto(const Eigen::Vector3d& direction, bool held) const {

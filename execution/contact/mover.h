@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/robot.h"
@@ -95,6 +96,9 @@ class Mover {
   /// Until a contact along the insertion, whose direction this is, has told how high the target stands, ways along it
   /// are no faster than kUnfelt_m_s.
   void KeepLowInto(std::optional<Direction> insertion) { unfelt_ = insertion; }
+  /// Nothing of the target stands farther out, against `insertion`, than this coordinate along it, which was felt: ways
+  /// that stay out there are free whatever surprised the tool below.
+  void KeepClearOf(Direction insertion, double outmost) { outmost_ = {insertion, outmost}; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
   Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
@@ -109,6 +113,8 @@ class Mover {
   /// The speed along `way` (unit vector, lattice axes) that keeps the budget at faces along any axis and at the edges
   /// between them.
   double SpeedOfCarefulWay(const Eigen::Vector3d& way) const;
+  /// The way to `target` stays outside of KeepClearOf.
+  bool StaysOut(const Eigen::Vector3d& target) const;
   void CheckLimits() const;
   /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
   MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,
@@ -118,6 +124,7 @@ class Mover {
   const LatticeFrame& frame_;
   const ExecutorOptions& options_;
   std::optional<Direction> unfelt_;
+  std::optional<std::pair<Direction, double>> outmost_;
   ExecutionRecord& record_;
   double start_time_s_;
   double last_motion_end_s_;

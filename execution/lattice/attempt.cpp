@@ -131,15 +131,30 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
   }
   record.world_T_estimate = attempt.frame.ToWorld(*attempt.target);
   record.localization_time_s = episode.robot.Time() - episode.started_s;
-
+  if (episode.options.ladder && insert.confirm && record.careful) {
+    // Touches of a turned target agree on no place. What turns it is felt sooner than an insertion fails.
+    attempt.end = AttemptEnd::kBlocked;
+    attempt.reason = "touches that agree on no place";
+    return;
+  }
   const BelievedInsertion verdict =
       ApproachAndInsert(task, *problem.map, *attempt.target, attempt.orientation, mover, attempt.evidence);
-  record.believed_inserted = verdict.inserted;
-  attempt.reason = verdict.reason;
-  attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
+  const bool localized = record.believed_localized;
+  Conclude(episode, attempt.frame, *attempt.target, verdict, attempt);
+  record.believed_localized = localized;  // without touches that confirm, no more than the policy believes
 }
 
 }  // namespace
+
+void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
+              const BelievedInsertion& verdict, Attempt& attempt) {
+  episode.record.world_T_estimate = frame.ToWorld(target);
+  episode.record.believed_localized = true;
+  episode.record.believed_inserted = verdict.inserted;
+  attempt.tried = true;
+  attempt.reason = verdict.reason;
+  attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
+}
 
 bool IsSure(const Task& task, const TargetFit& fit) {
   if (fit.violations > 0) return false;

@@ -11,6 +11,7 @@
 #include "feeler/execution/contact/contact_evidence.h"
 #include "feeler/execution/contact/execution_record.h"
 #include "feeler/execution/contact/executor_options.h"
+#include "feeler/execution/contact/insertion.h"
 #include "feeler/execution/contact/lattice_frame.h"
 #include "feeler/execution/contact/mover.h"
 #include "feeler/planner/belief/problem.h"
@@ -42,7 +43,8 @@ struct Attempt {
   std::vector<Touch> evidence;  ///< in lattice coordinates of the frame
   std::optional<Eigen::Vector3d> target;
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< half width of what the last refit leaves, per axis, cells
-  bool sure = false;  ///< the fit explains every touch, and a contact pins each axis across the insertion
+  bool sure = false;   ///< the fit explains every touch, and a contact pins each axis across the insertion
+  bool tried = false;  ///< the tool was pushed at the target
   int orientation = 0;
 };
 
@@ -60,5 +62,9 @@ bool IsSure(const Task& task, const TargetFit& fit);
 
 /// Writes a fit into the record as the estimate.
 void RecordEstimate(const Episode& episode, const LatticeFrame& frame, const TargetFit& fit);
+
+/// Takes over what an insertion in `frame` at `target` came to.
+void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
+              const BelievedInsertion& verdict, Attempt& attempt);
 
 }  // namespace feeler::execution

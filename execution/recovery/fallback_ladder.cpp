@@ -59,14 +59,34 @@ Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
   return {episode.robot, frame, episode.options, episode.record, episode.started_s};
 }
 
-/// Takes over what an insertion in `frame` at `target` came to.
-void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
-              const BelievedInsertion& verdict, Attempt& attempt) {
-  episode.record.world_T_estimate = frame.ToWorld(target);
-  episode.record.believed_localized = true;
-  episode.record.believed_inserted = verdict.inserted;
-  attempt.reason = verdict.reason;
-  attempt.end = verdict.inserted ? AttemptEnd::kInserted : verdict.blocked ? AttemptEnd::kBlocked : AttemptEnd::kLost;
+/// How far out from its mouth anything of the target stands, along the axis of the insertion, a cell of room included;
+/// known once a contact along the insertion has told how high the target stands.
+std::optional<double> Outmost(const Task& task, const planner::ContactMap& map, const Attempt& attempt) {
+  if (!attempt.target) return std::nullopt;
+  const bool felt = std::any_of(attempt.evidence.begin(), attempt.evidence.end(), [&](const Touch& touch) {
+    return touch.contact && !touch.is_oblique() && touch.direction == task.insertion;
+  });
+  if (!felt) return std::nullopt;
+  constexpr double kRoom = 1.5;  // what is blocked ends within a cell of the last that is
+  const int axis = AxisOf(task.insertion);
+  const int out = -SignOf(task.insertion);
+  const CellBox& box = map.domain();
+  for (int place = out > 0 ? box.max[axis] : box.min[axis]; box.min[axis] <= place && place <= box.max[axis];
+       place -= out) {
+    Cell least = box.min;
+    Cell most = box.max;
+    least[axis] = most[axis] = place;
+    for (int x = least.x(); x <= most.x(); ++x) {
+      for (int y = least.y(); y <= most.y(); ++y) {
+        for (int z = least.z(); z <= most.z(); ++z) {
+          if (map.Blocked({x, y, z}, attempt.orientation)) {
+            return place + map.phase()[axis] + out * kRoom;
+          }
+        }
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 /// Off whatever the tool stands on, straight out of the opening.
@@ -134,6 +154,9 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
   const Task& task = episode.task;
   const planner::ContactMap& map = *problem.map;
   Mover mover = MoverFor(episode, attempt.frame);
+  if (const auto outmost = Outmost(task, map, attempt)) {
+    mover.KeepClearOf(task.insertion, (*attempt.target)[AxisOf(task.insertion)] + *outmost);
+  }
   ComeOff(task, *attempt.target, mover);
   const std::optional<YawFit> fit =
       MeasureYaw(task, map, *attempt.target, attempt.orientation, mover, attempt.evidence);
@@ -142,8 +165,12 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
       sound ? fmt::format("{}; measured {:.2f} deg", attempt.reason, fit->yaw_rad / kDegree)
             : attempt.reason + "; no wall tells");
   if (!sound) {
+    if (!attempt.tried) {
+      Conclude(episode, attempt.frame, *attempt.target,
+               ApproachAndInsert(task, map, *attempt.target, attempt.orientation, mover, attempt.evidence), attempt);
+    }
     // Where everything else agrees the place is right, and turns can still be tried.
-    if (!attempt.sure) attempt.end = AttemptEnd::kLost;
+    if (!attempt.sure && attempt.end == AttemptEnd::kBlocked) attempt.end = AttemptEnd::kLost;
     return;
   }
   const double yaw_rad = std::abs(fit->yaw_rad) < kSmallestTurn_rad ? 0.0 : fit->yaw_rad;
@@ -206,9 +233,12 @@ void AtMouth(void (*rung)(const Episode&, const planner::Problem&, Attempt&), co
   }
 }
 
-/// Out of the opening, over the start pose of the problem, and down to it.
-void GoToStart(const Episode& episode, const planner::Problem& problem, const LatticeFrame& frame) {
+/// Out of the opening, over the start pose of the problem, and down to it. `outmost`: where the target stands in the
+/// middle of the hypotheses, as far as that was felt.
+void GoToStart(const Episode& episode, const planner::Problem& problem, const LatticeFrame& frame,
+               const std::optional<double>& outmost) {
   Mover mover = MoverFor(episode, frame);
+  if (outmost) mover.KeepClearOf(episode.task.insertion, frame.center[AxisOf(episode.task.insertion)] + *outmost);
   const int axis = AxisOf(episode.task.insertion);
   const double out = -SignOf(episode.task.insertion);
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();
@@ -231,11 +261,12 @@ int CellsFor(double half_width, int most) {
 
 /// The next attempt; empty if no policy for it was found.
 std::optional<Attempt> NewAttempt(const Episode& episode, const planner::Problem& like, const Pose& world_T_estimate,
-                                  const planner::Extents& extents, OnlinePlanner& planner) {
+                                  const planner::Extents& extents, const std::optional<double>& outmost,
+                                  OnlinePlanner& planner) {
   const planner::Problem problem = planner::MakeCuboidProblem(episode.task, like.map, extents);
   const std::unique_ptr<policies::Policy> policy = planner.PolicyFor(problem);
   if (!policy) return std::nullopt;
-  GoToStart(episode, problem, FrameOf(episode.task, problem, world_T_estimate));
+  GoToStart(episode, problem, FrameOf(episode.task, problem, world_T_estimate), outmost);
   return RunAttempt(episode, problem, world_T_estimate, *policy);
 }
 
@@ -280,10 +311,11 @@ std::string ClimbLadder(const Episode& episode, const planner::Problem& problem,
     if (retry == 0 && attempt.target) {
       Log(episode, rung::kResolve, attempt.reason);
       next = NewAttempt(episode, problem, attempt.frame.ToWorld(*attempt.target),
-                        ExtentsAround(episode.task, attempt.spread), *planner);
+                        ExtentsAround(episode.task, attempt.spread), Outmost(episode.task, *problem.map, attempt),
+                        *planner);
     } else {
       Log(episode, rung::kWholeCuboid, attempt.reason);
-      next = NewAttempt(episode, problem, world_T_estimate, WithMargin(episode.task, problem), *planner);
+      next = NewAttempt(episode, problem, world_T_estimate, WithMargin(episode.task, problem), std::nullopt, *planner);
     }
     if (!next) {
       attempt.end = AttemptEnd::kLost;
