@@ -130,7 +130,7 @@ function(feeler_tests room)  # the tests of `cli` run the binary
   add_executable(${room}_tests EXCLUDE_FROM_ALL ${sources})
   add_dependencies(tests ${room}_tests)
   feeler_unity(${room}_tests feeler_test_headers ${sources})
-  target_link_libraries(${room}_tests PRIVATE feeler_options ${ARGN} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${room}_tests PRIVATE feeler_options ${ARGN} fmt::fmt GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${room}_tests PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/..."
   target_compile_definitions(${room}_tests PRIVATE FEELER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" FEELER_BINARY="${PROJECT_BINARY_DIR}/feeler")
   target_compile_options(${room}_tests PRIVATE ${FEELER_LIGHT})

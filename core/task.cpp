@@ -27,6 +27,18 @@ CostWeights CostPerAxis(const std::array<double, 3>& per_cell, double per_contac
   return cost;
 }
 
+void SetLateral(Tolerance& tolerance, Direction insertion, Eigen::Vector3d lateral_m) {
+  const int along = AxisOf(insertion);
+  lateral_m[along] = std::min(lateral_m[(along + 1) % 3], lateral_m[(along + 2) % 3]);
+  tolerance.lateral_m = lateral_m.minCoeff();
+  tolerance.lateral_beyond_m = lateral_m.array() - tolerance.lateral_m;
+}
+
+void SetAngles(Tolerance& tolerance, const Eigen::Vector3d& angle_rad) {
+  tolerance.angle_rad = angle_rad.minCoeff();
+  tolerance.angle_beyond_rad = angle_rad.array() - tolerance.angle_rad;
+}
+
 CostWeights TimeCost(const Task& task) {
   // A weight per cell cannot tell cells known to be free from those that are probed: the share that policies probe,
   // measured 0.17 to 0.28 for cuboids of 7 to 15 cells.

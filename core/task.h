@@ -63,10 +63,23 @@ std::string_view ToString(GoalKind kind);
 
 /// Largest error of the estimated target pose with which an insertion still succeeds.
 struct Tolerance {
-  double lateral_m = 0.001;   ///< across the insertion axis
+  double lateral_m = 0.001;   ///< across the insertion axis, along the axis that allows least
   double vertical_m = 0.002;  ///< along the insertion axis
-  double angle_rad = 0.03;
+  double angle_rad = 0.03;    ///< of the turn; where axes differ, about the one that allows least
+  /// What the axes of the target frame allow beyond that.
+  Eigen::Vector3d lateral_beyond_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angle_beyond_rad = Eigen::Vector3d::Zero();
+
+  double Lateral(int axis) const { return lateral_m + lateral_beyond_m[axis]; }
+  double LargestLateral() const { return lateral_m + lateral_beyond_m.maxCoeff(); }
+  double Angle(int axis) const { return angle_rad + angle_beyond_rad[axis]; }
+  bool one_lateral() const { return lateral_beyond_m.isZero(0.0); }
+  bool one_angle() const { return angle_beyond_rad.isZero(0.0); }
 };
+/// Of three values, one per axis of the target frame; the one along the insertion does not count.
+void SetLateral(Tolerance& tolerance, Direction insertion, Eigen::Vector3d lateral_m);
+/// Of turns about the axes of the target frame, rad.
+void SetAngles(Tolerance& tolerance, const Eigen::Vector3d& angle_rad);
 
 /// What is inserted into what: the numbers of a task file (docs/task-file.md), without its geometry.
 ///

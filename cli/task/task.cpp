@@ -54,6 +54,30 @@ nlohmann::json AxisJson(const UncertainAxis& axis) {
           {"max_cells", axis.max_cells}};
 }
 
+/// A value per axis of the target frame, as JSON.
+template <class ValueOf>
+nlohmann::json PerAxis(const ValueOf& value_of) {
+  return {value_of(0), value_of(1), value_of(2)};
+}
+
+std::string LateralText(const Task& task) {
+  const Tolerance& tolerance = task.tolerance;
+  if (tolerance.one_lateral()) return fmt::format("{:.4g}", 1e3 * tolerance.lateral_m);
+  std::string text;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == AxisOf(task.insertion)) continue;
+    text += fmt::format("{}{:.4g} ({})", text.empty() ? "" : " x ", 1e3 * tolerance.Lateral(axis), "xyz"[axis]);
+  }
+  return text;
+}
+
+std::string AngleText(const Task& task) {
+  const Tolerance& tolerance = task.tolerance;
+  const auto degrees = [&](int axis) { return tolerance.Angle(axis) * 180 / std::numbers::pi; };
+  if (tolerance.one_angle()) return fmt::format("{:.4g}", degrees(0));
+  return fmt::format("{:.3g} / {:.3g} / {:.3g} (about x, y, z)", degrees(0), degrees(1), degrees(2));
+}
+
 /// Share of the displacements of the domain where tool and target overlap.
 double BlockedShare(const planner::ContactMap& map) {
   std::int64_t blocked = 0;
@@ -93,8 +117,10 @@ nlohmann::json TaskJson(const workflow::PlanningSetup& setup) {
           {"insertion_depth_m", task.insertion_depth_m},
           {"tolerance",
            {{"lateral_m", task.tolerance.lateral_m},
+            {"lateral_per_axis_m", PerAxis([&](int axis) { return task.tolerance.Lateral(axis); })},
             {"vertical_m", task.tolerance.vertical_m},
-            {"angle_rad", task.tolerance.angle_rad}}},
+            {"angle_rad", task.tolerance.angle_rad},
+            {"angle_per_axis_rad", PerAxis([&](int axis) { return task.tolerance.Angle(axis); })}}},
           {"cost",
            {{"per_cell", task.cost.per_cell},
             {"per_contact", task.cost.per_contact},
@@ -142,9 +168,9 @@ void PrintTask(const workflow::PlanningSetup& setup) {
     hypotheses *= axis.max_cells;
   }
   Print("family         {} problems of at most {} hypotheses\n", problems, hypotheses);
-  Print("insertion      {}, {:.4g} mm deep, tolerance {:.4g} mm lateral, {:.4g} mm vertical, {:.4g} deg\n",
-        ToString(task.insertion), task.insertion_depth_m * 1000, task.tolerance.lateral_m * 1000,
-        task.tolerance.vertical_m * 1000, task.tolerance.angle_rad * 180 / std::numbers::pi);
+  Print("insertion      {}, {:.4g} mm deep, tolerance {} mm lateral, {:.4g} mm vertical, {} deg\n",
+        ToString(task.insertion), task.insertion_depth_m * 1000, LateralText(task), task.tolerance.vertical_m * 1000,
+        AngleText(task));
   Print("cost           {} per cell, {} per contact, {} per action; goal {}\n", task.cost.per_cell,
         task.cost.per_contact, task.cost.per_action, ToString(task.goal));
   const env::TaskModel& model = setup.model;

@@ -22,7 +22,7 @@ constexpr double kFarWall_m = 1e-3;
 InsertionLimits LimitsOf(const Task& task) {
   InsertionLimits limits;
   limits.depth_tolerance_m = task.tolerance.vertical_m;
-  limits.lateral_m = task.tolerance.lateral_m;
+  for (int axis = 0; axis < 3; ++axis) limits.lateral_m[axis] = task.tolerance.Lateral(axis);
   return limits;
 }
 
@@ -32,15 +32,15 @@ InsertionLimits LimitsOf(const Task& task, const TaskPieces& pieces) {
   const Eigen::Vector3d inserted_m =
       UnitVector(task.insertion) *
       std::max(0.5 * task.insertion_depth_m, task.insertion_depth_m - limits.depth_tolerance_m);
-  const double far_m = std::max(kFarWall_m, 4.0 * limits.lateral_m);
   std::vector<planner::ToolMotion> motions;
   for (const Direction direction : kDirections) {
     if (AxisOf(direction) != AxisOf(task.insertion)) motions.push_back({inserted_m, direction});
   }
   const std::vector<double> room_m = travel.Travel(Pose::Identity(), motions);
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    if (room_m[i] < 0.0 || room_m[i] > far_m) continue;
     const Direction direction = motions[i].direction;
+    const double far_m = std::max(kFarWall_m, 4.0 * limits.lateral_m[AxisOf(direction)]);
+    if (room_m[i] < 0.0 || room_m[i] > far_m) continue;
     limits.walls_m[static_cast<std::size_t>(AxisOf(direction))][SignOf(direction) > 0 ? 1 : 0] = room_m[i] + kGive_m;
   }
   return limits;
@@ -64,7 +64,7 @@ bool InsertionLimits::InsideOpening(const Task& task, const Eigen::Vector3d& dis
     if (axis == AxisOf(task.insertion)) continue;
     const double wall_m = walls_m[static_cast<std::size_t>(axis)][displacement_m[axis] > 0.0 ? 1 : 0];
     // Negated, so that what is not a number is not inside.
-    if (!(std::abs(displacement_m[axis]) <= (wall_m > 0.0 ? wall_m : lateral_m))) return false;
+    if (!(std::abs(displacement_m[axis]) <= (wall_m > 0.0 ? wall_m : lateral_m[axis]))) return false;
   }
   return true;
 }

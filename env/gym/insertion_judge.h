@@ -13,8 +13,9 @@ namespace feeler::env {
 /// Beyond which an insertion does not count.
 struct InsertionLimits {
   double depth_tolerance_m = 0.001;  ///< may be missing to the task's insertion depth
-  /// Along each of the two axes across the insertion, towards sides where no wall of the opening holds the tool.
-  double lateral_m = 0.001;
+  /// Per axis of the target frame, of which the two across the insertion count, towards sides where no wall of the
+  /// opening holds the tool.
+  Eigen::Vector3d lateral_m = Eigen::Vector3d::Constant(0.001);
   /// Per axis of the target frame, towards its negative and its positive side: how far the tool may stand from the
   /// middle where a wall of the opening holds it, the give of the contact included. 0: no wall, lateral_m counts.
   std::array<std::array<double, 2>, 3> walls_m{};

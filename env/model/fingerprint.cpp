@@ -134,6 +134,8 @@ std::string Fingerprint(const TaskModel& task_model, Opening opening) {
   digest.AddReal(task.tolerance.lateral_m);
   digest.AddReal(task.tolerance.vertical_m);
   digest.AddReal(task.tolerance.angle_rad);
+  if (!task.tolerance.one_lateral()) digest.AddVector(task.tolerance.lateral_beyond_m);
+  if (!task.tolerance.one_angle()) digest.AddVector(task.tolerance.angle_beyond_rad);
   return digest.Hex();
 }
 

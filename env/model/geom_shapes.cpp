@@ -1,7 +1,9 @@
 #include "feeler/env/model/geom_shapes.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cassert>
+#include <limits>
 
 namespace feeler::env {
 namespace {
@@ -57,6 +59,29 @@ planner::ConvexPiece PieceOf(const mjModel& model, int geom, const Pose& frame_T
     default: piece.kind = planner::ShapeKind::kBox;
   }
   return piece;
+}
+
+std::array<double, 2> SpanOf(const mjModel& model, const std::vector<int>& geoms, int body,
+                             const Eigen::Vector3d& along) {
+  std::array<double, 2> span{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const int geom : geoms) {
+    if (model.geom_type[geom] == mjGEOM_PLANE) continue;
+    const Pose pose = GeomInBody(model, geom, body);
+    const auto add = [&](double value) { span = {std::min(span[0], value), std::max(span[1], value)}; };
+    if (model.geom_type[geom] == mjGEOM_MESH) {
+      for (const Eigen::Vector3d& vertex : MeshHull(model, geom)) add(along.dot(pose * vertex));
+      continue;
+    }
+    const double* size = model.geom_size + 3 * geom;
+    Eigen::Vector3d half(size[0], size[1], size[2]);
+    if (model.geom_type[geom] == mjGEOM_SPHERE) half.setConstant(size[0]);
+    if (model.geom_type[geom] == mjGEOM_CYLINDER) half = {size[0], size[0], size[1]};
+    if (model.geom_type[geom] == mjGEOM_CAPSULE) half = {size[0], size[0], size[0] + size[1]};
+    const double reach = (pose.linear().transpose() * along).cwiseAbs().dot(half);
+    add(along.dot(pose.translation()) + reach);
+    add(along.dot(pose.translation()) - reach);
+  }
+  return span;
 }
 
 }  // namespace feeler::env

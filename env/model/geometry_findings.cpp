@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "feeler/env/model/geom_shapes.h"
+#include "feeler/env/model/mouth_clearance.h"
 #include "feeler/env/model/overlap_judge.h"
 
 namespace feeler::env {
@@ -34,8 +35,6 @@ std::string Geom(const std::string& where, const mjModel& model, int geom) {
 std::string Place(const Eigen::Vector3d& p_m) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p_m.x() * 1000, p_m.y() * 1000, p_m.z() * 1000);
 }
-
-double JustInside(const Task& task) { return std::min(5e-5, task.insertion_depth_m / 10); }
 
 double TriangleVolume(const mjModel& model, int mesh, const int* corners) {
   const float* base = model.mesh_vert + 3 * model.mesh_vertadr[mesh];
@@ -63,37 +62,13 @@ double ConvexShare(const mjModel& model, int geom) {
   return hull == 0 ? 1 : std::abs(volume) / std::abs(hull);
 }
 
-/// Smallest and largest coordinate of a body's geoms along a direction, in the body's frame. Planes are left out.
-std::array<double, 2> Span(const mjModel& model, const std::vector<int>& geoms, int body,
-                           const Eigen::Vector3d& along) {
-  std::array<double, 2> span{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-  for (const int geom : geoms) {
-    if (model.geom_type[geom] == mjGEOM_PLANE) continue;
-    const Pose pose = GeomInBody(model, geom, body);
-    const auto add = [&](double value) { span = {std::min(span[0], value), std::max(span[1], value)}; };
-    if (model.geom_type[geom] == mjGEOM_MESH) {
-      for (const Eigen::Vector3d& vertex : MeshHull(model, geom)) add(along.dot(pose * vertex));
-      continue;
-    }
-    const double* size = model.geom_size + 3 * geom;
-    Eigen::Vector3d half(size[0], size[1], size[2]);
-    if (model.geom_type[geom] == mjGEOM_SPHERE) half.setConstant(size[0]);
-    if (model.geom_type[geom] == mjGEOM_CYLINDER) half = {size[0], size[0], size[1]};
-    if (model.geom_type[geom] == mjGEOM_CAPSULE) half = {size[0], size[0], size[0] + size[1]};
-    const double reach = (pose.linear().transpose() * along).cwiseAbs().dot(half);
-    add(along.dot(pose.translation()) + reach);
-    add(along.dot(pose.translation()) - reach);
-  }
-  return span;
-}
-
 void AddMillimetres(const TaskModel& task_model, const std::string& where, TaskFindings& findings) {
   const mjModel& model = *task_model.model;
   for (const bool tool : {true, false}) {
     double extent = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto span = Span(model, tool ? task_model.tool_geoms : task_model.target_geoms,
-                             tool ? task_model.tool_body : task_model.target_body, Eigen::Vector3d::Unit(axis));
+      const auto span = SpanOf(model, tool ? task_model.tool_geoms : task_model.target_geoms,
+                               tool ? task_model.tool_body : task_model.target_body, Eigen::Vector3d::Unit(axis));
       if (span[1] > span[0]) extent = std::max(extent, span[1] - span[0]);
     }
     if (extent <= (tool ? kLongestTool_m : kLongestTarget_m)) continue;
@@ -187,7 +162,7 @@ Cause CauseOf(const TaskModel& task_model, const OverlapJudge::Meeting& meeting)
                         degrees, degrees == 180 ? ": the key is upside down" : "")};
   }
   const Eigen::Vector3d inward = UnitVector(task.insertion);
-  const double tip_m = Span(model, task_model.tool_geoms, task_model.tool_body, inward)[1];
+  const double tip_m = SpanOf(model, task_model.tool_geoms, task_model.tool_body, inward)[1];
   for (const Eigen::Vector3d& along : {Eigen::Vector3d(Eigen::Vector3d::Zero()), Eigen::Vector3d(-tip_m * inward)}) {
     const auto offset = OffsetThatFits(task_model, along);
     if (!offset || offset->norm() < 1e-6) continue;
@@ -223,17 +198,6 @@ void AddWayIn(const TaskModel& task_model, const std::string& where, TaskFinding
        cause.mend});
 }
 
-bool Enters(OverlapJudge& judge, const Task& task, double tolerance_m) {
-  const int axis = AxisOf(task.insertion);
-  for (int k = 0; k < 9; ++k) {
-    Eigen::Vector3d place_m = UnitVector(task.insertion) * JustInside(task);
-    place_m[(axis + 1) % 3] += tolerance_m * (k % 3 - 1);
-    place_m[(axis + 2) % 3] += tolerance_m * (k / 3 - 1);
-    if (judge.Overlap(place_m)) return false;
-  }
-  return true;
-}
-
 std::string ClearanceText(const TaskModel& task_model) {
   const auto clearance = ClearanceAtMouth(task_model);
   std::string text;
@@ -247,15 +211,27 @@ std::string ClearanceText(const TaskModel& task_model) {
 
 void AddTolerance(const TaskModel& task_model, const std::string& where, TaskFindings& findings) {
   const Task& task = task_model.task;
+  Eigen::Vector3d lateral_m;
+  for (int axis = 0; axis < 3; ++axis) lateral_m[axis] = task.tolerance.Lateral(axis);
   OverlapJudge open(task_model, task_model.target_geoms);
-  if (Enters(open, task, task.tolerance.lateral_m)) return;
-  const double largest_m = LargestLateralTolerance(task_model);
-  findings.push_back(
-      {Severity::kError, "tolerance", Numeric(where, "feeler_tolerance_lateral"),
-       fmt::format("a tool displaced by {} m along each axis misses the opening: measured clearance at the mouth {}",
-                   task.tolerance.lateral_m, ClearanceText(task_model)),
-       fmt::format("the tolerance is at most the clearance and the lead-in chamfer: at most {:.3g} m here",
-                   std::floor(largest_m * 1e7) / 1e7)});
+  if (EntersDisplaced(open, task, lateral_m)) return;
+  const Eigen::Vector3d largest_m = LargestLateralTolerance(task_model);
+  const int first = AxisOf(task.insertion) == 0 ? 1 : 0;
+  const int second = AxisOf(task.insertion) == 2 ? 1 : 2;
+  const auto down = [](double value_m) { return std::floor(value_m * 1e7) / 1e7; };
+  const double both_m = LargestLateralOnBoth(task_model);
+  const std::string given = task.tolerance.one_lateral()
+                                ? fmt::format("{} m along each axis", task.tolerance.lateral_m)
+                                : fmt::format("{} and {} m along its two axes", lateral_m[first], lateral_m[second]);
+  std::string mend = fmt::format(
+      "the tolerance is at most the clearance and the lead-in chamfer: at most {:.3g} m here", down(both_m));
+  if (std::max(largest_m[first], largest_m[second]) > 1.05 * both_m) {
+    mend += fmt::format(", or per axis \"{:.3g} {:.3g}\"", down(largest_m[first]), down(largest_m[second]));
+  }
+  findings.push_back({Severity::kError, "tolerance", Numeric(where, "feeler_tolerance_lateral"),
+                      fmt::format("a tool displaced by {} misses the opening: measured clearance at the mouth {}",
+                                  given, ClearanceText(task_model)),
+                      mend});
 }
 
 /// Whether the tool at this start offset is free of the target under all hypotheses of the largest extents.
@@ -321,46 +297,6 @@ std::string NameOfTaskGeom(const mjModel& model, int geom) {
   const std::string of = fmt::format(" of {}", body == nullptr ? "the world" : body);
   if (name != nullptr) return fmt::format("\"{}\"", name) + of;
   return fmt::format("geom {}", geom - model.body_geomadr[model.geom_bodyid[geom]] + 1) + of;
-}
-
-std::array<std::array<double, 2>, 3> ClearanceAtMouth(const TaskModel& task_model) {
-  constexpr double kFar_m = 0.02;
-  const Task& task = task_model.task;
-  OverlapJudge open(task_model, task_model.target_geoms);
-  std::array<std::array<double, 2>, 3> clearance;
-  for (auto& sides : clearance) sides.fill(std::numeric_limits<double>::infinity());
-  const Eigen::Vector3d mouth_m = UnitVector(task.insertion) * JustInside(task);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (axis == AxisOf(task.insertion)) continue;
-    for (int side = 0; side < 2; ++side) {
-      const Eigen::Vector3d way = Eigen::Vector3d::Unit(axis) * (side == 0 ? -1 : 1);
-      double free_m = 0;
-      double step_m = 1e-5;
-      while (step_m <= kFar_m && !open.Overlap(mouth_m + way * step_m)) {
-        free_m = step_m;
-        step_m *= 1.5;
-      }
-      if (step_m > kFar_m) continue;
-      for (int i = 0; i < 30; ++i) {
-        const double middle_m = 0.5 * (free_m + step_m);
-        (open.Overlap(mouth_m + way * middle_m) ? step_m : free_m) = middle_m;
-      }
-      clearance[static_cast<std::size_t>(axis)][static_cast<std::size_t>(side)] = free_m;
-    }
-  }
-  return clearance;
-}
-
-double LargestLateralTolerance(const TaskModel& task_model) {
-  OverlapJudge open(task_model, task_model.target_geoms);
-  double fits_m = 0;
-  double misses_m = 0.02;
-  if (!Enters(open, task_model.task, 0.0)) return 0;
-  for (int i = 0; i < 40; ++i) {
-    const double middle_m = 0.5 * (fits_m + misses_m);
-    (Enters(open, task_model.task, middle_m) ? fits_m : misses_m) = middle_m;
-  }
-  return fits_m;
 }
 
 TaskFindings GeometryFindings(const TaskModel& task_model, const std::string& where) {

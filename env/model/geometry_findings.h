@@ -1,7 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
+#include <string>
 
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/model/task_finding.h"
@@ -15,13 +14,6 @@ TaskFindings GeometryFindings(const TaskModel& task_model, const std::string& wh
 
 /// What closes the opening while the target is localized: no lid, a misnamed one, one that leaves the way in free.
 TaskFindings LidFindings(const TaskModel& task_model, const std::string& where);
-
-/// How far the aligned tool, just inside the mouth, may move towards each side of each axis of the target before it
-/// touches, m; infinite along the insertion and where nothing is within 2 cm.
-std::array<std::array<double, 2>, 3> ClearanceAtMouth(const TaskModel& task_model);
-
-/// The largest lateral tolerance with which the tool, displaced along both axes at once, still enters the mouth, m.
-double LargestLateralTolerance(const TaskModel& task_model);
 
 /// "geom west of body target", for people.
 std::string NameOfTaskGeom(const mjModel& model, int geom);

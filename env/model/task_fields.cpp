@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -242,15 +243,39 @@ void ReadMotion(const Fields& fields, Task& task) {
   task.flange_T_tool = MakePose(position, orientation);
 }
 
-void ReadVerdict(const Fields& fields, Task& task) {
-  const auto positive = [&](const char* field, const std::string& meaning, double high) {
-    const double value = fields.Number(field, meaning, 0, high);
-    if (value == 0) fields.FailNumber(field, "is zero", "no real insertion has no tolerance");
-    return value;
+/// Where a field is absent its values are NaN: DeriveTolerances measures them.
+void ReadTolerances(const Fields& fields, Task& task) {
+  const auto positive = [&](const char* field, std::size_t axes, const std::string& meaning, double high) {
+    if (!fields.HasNumeric(field)) return std::vector<double>{std::numeric_limits<double>::quiet_NaN()};
+    std::vector<double> values = fields.Numbers(field, -1, meaning);
+    if (values.size() != 1 && values.size() != axes) {
+      fields.FailNumber(field, fmt::format("has {} values instead of 1 or {}", values.size(), axes), "give " + meaning);
+    }
+    for (const double value : values) {
+      fields.CheckRange(field, value, 0, high);
+      if (value == 0) fields.FailNumber(field, "is zero", "no real insertion has no tolerance");
+    }
+    return values;
   };
-  task.tolerance.lateral_m = positive("feeler_tolerance_lateral", "the largest error across the insertion, m", 0.1);
-  task.tolerance.vertical_m = positive("feeler_tolerance_vertical", "the largest error along the insertion, m", 0.1);
-  task.tolerance.angle_rad = positive("feeler_tolerance_angle", "the largest error of the orientation, rad", 1);
+  const auto lateral = positive("feeler_tolerance_lateral", 2,
+                                "the largest error across the insertion, m: one number, or one per axis", 0.1);
+  const int along = AxisOf(task.insertion);
+  Eigen::Vector3d per_axis = Eigen::Vector3d::Constant(lateral.front());
+  per_axis[along == 2 ? 1 : 2] = lateral.back();
+  SetLateral(task.tolerance, task.insertion, per_axis);
+  const double derived_m = std::min(0.002, 0.2 * task.insertion_depth_m);
+  task.tolerance.vertical_m = derived_m;
+  if (fields.HasNumeric("feeler_tolerance_vertical")) {
+    task.tolerance.vertical_m =
+        positive("feeler_tolerance_vertical", 1, "the largest error along the insertion, m", 0.1).front();
+  }
+  const auto angle = positive("feeler_tolerance_angle", 3,
+                              "the largest error of the orientation, rad: one number, or one about each axis", 1);
+  SetAngles(task.tolerance, {angle.front(), angle[angle.size() / 2], angle.back()});
+}
+
+void ReadVerdict(const Fields& fields, Task& task) {
+  ReadTolerances(fields, task);
   if (task.tolerance.vertical_m >= task.insertion_depth_m) {
     fields.FailNumber(
         "feeler_tolerance_vertical",

@@ -13,6 +13,7 @@
 #include "feeler/env/model/contact_settings.h"
 #include "feeler/env/model/geometry_findings.h"
 #include "feeler/env/model/mesh_check.h"
+#include "feeler/env/model/mouth_clearance.h"
 #include "feeler/env/model/mujoco_handles.h"
 #include "feeler/env/model/overlap_judge.h"
 #include "feeler/env/model/read_task.h"
@@ -138,6 +139,7 @@ TaskModel ReadTaskFromText(const std::string& mjcf, const std::string& name, con
   task_model.task = ReadTaskFields(model, name);
   task_model.task.world_T_target = BodyAtRest(model, task_model.target_body);
   task_model.task.name = NameOf(model, fs::path(name).stem().string());
+  DeriveTolerances(task_model);
   return task_model;
 }
 

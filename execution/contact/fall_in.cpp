@@ -77,7 +77,7 @@ std::optional<Eigen::Vector3d> StepAside(const planner::ContactMap& map, Directi
 }  // namespace
 
 double FarthestWallInside(const Task& task, const Mover& mover) {
-  return mover.Cells(2.0 * task.tolerance.lateral_m + mover.options().shortfall_m);
+  return mover.Cells(2.0 * task.tolerance.LargestLateral() + mover.options().shortfall_m);
 }
 
 bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool) {

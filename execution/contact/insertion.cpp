@@ -108,7 +108,7 @@ double FarthestInside(const Task& task, const planner::ContactMap& map, int orie
     return false;
   };
   while (ring < widest && !clear_on(ring)) ++ring;
-  return std::max(0.5 * ring, 2.0 * task.tolerance.lateral_m / cell_m);
+  return std::max(0.5 * ring, 2.0 * task.tolerance.LargestLateral() / cell_m);
 }
 
 BelievedInsertion InsertFromHere(const Task& task, const Eigen::Vector3d& target, double farthest_inside,

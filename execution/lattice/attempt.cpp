@@ -17,6 +17,10 @@
 namespace feeler::execution {
 namespace {
 
+/// How far outside the start belief a truth is looked for, per axis: this much of the largest uncertainty that the task
+/// knows. What estimates where targets are is wrong by more than it says in proportion to what it says.
+constexpr double kBeyondUncertainty = 0.25;
+
 Region HullOf(const std::vector<planner::Hypothesis>& hypotheses) {
   Region hull{hypotheses.front().offset.cast<double>(), hypotheses.front().offset.cast<double>()};
   for (const planner::Hypothesis& h : hypotheses) {
@@ -88,6 +92,14 @@ void SearchAndInsert(const Episode& episode, const planner::ContactMap& map, con
   attempt.end = verdict.inserted ? AttemptEnd::kInserted : AttemptEnd::kBlocked;
 }
 
+/// No place of a target that is not turned, in the start belief or around it, explains what was felt.
+bool IsFeltTurned(const Episode& episode, const planner::ContactMap& map, const Attempt& attempt) {
+  const Eigen::Vector3d beyond = CellsBeyond(episode.task).cast<double>();
+  return FitTargetAnywhere(map, attempt.evidence, attempt.possible.lower - beyond, attempt.possible.upper + beyond,
+                           attempt.orientation, episode.options.fit)
+             .violations > 0;
+}
+
 /// Fills the attempt step by step, so that what was reached stands in it after a failure.
 void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, policies::Policy& policy, Mover& mover,
                        Attempt& attempt) {
@@ -131,7 +143,7 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
   }
   record.world_T_estimate = attempt.frame.ToWorld(*attempt.target);
   record.localization_time_s = episode.robot.Time() - episode.started_s;
-  if (episode.options.ladder && insert.confirm && record.careful) {
+  if (episode.options.ladder && insert.confirm && record.careful && IsFeltTurned(episode, *problem.map, attempt)) {
     // Touches of a turned target agree on no place. What turns it is felt sooner than an insertion fails.
     attempt.end = AttemptEnd::kBlocked;
     attempt.reason = "touches that agree on no place";
@@ -145,6 +157,16 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
 }
 
 }  // namespace
+
+Cell CellsBeyond(const Task& task) {
+  const Cell largest = LargestPositionExtents(task);
+  Cell beyond;
+  for (int axis = 0; axis < 3; ++axis) {
+    beyond[axis] = largest[axis] > 1 ? static_cast<int>(std::ceil(kBeyondUncertainty * largest[axis])) : 0;
+  }
+  // An axis that counts as certain is off by a little of what the others are.
+  return beyond.cwiseMax(1);
+}
 
 void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
               const BelievedInsertion& verdict, Attempt& attempt) {

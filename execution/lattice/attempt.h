@@ -63,6 +63,9 @@ bool IsSure(const Task& task, const TargetFit& fit);
 /// Writes a fit into the record as the estimate.
 void RecordEstimate(const Episode& episode, const LatticeFrame& frame, const TargetFit& fit);
 
+/// Cells beyond the start belief, along each axis, in which a truth is looked for that it does not hold.
+Cell CellsBeyond(const Task& task);
+
 /// Takes over what an insertion in `frame` at `target` came to.
 void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,
               const BelievedInsertion& verdict, Attempt& attempt);

@@ -335,7 +335,8 @@ class PoseAttempt {
     }
     if (!met) {
       mover.ZeroWrench();
-      verdict = InsertFromHere(task_, Eigen::Vector3d::Zero(), 2.0 * mover.Cells(task_.tolerance.lateral_m), mover);
+      verdict =
+          InsertFromHere(task_, Eigen::Vector3d::Zero(), 2.0 * mover.Cells(task_.tolerance.LargestLateral()), mover);
       if (verdict.inserted) return verdict;
     }
     // Off the mouth along the opening, then back to the orientation of the frame.

@@ -15,13 +15,26 @@ PoseError PoseErrorOf(const Task& task, const Pose& reference, const Pose& pose)
   const int along = AxisOf(task.insertion);
   Eigen::Vector3d across = difference.translation();
   across[along] = 0.0;
-  return {across.norm(), across.cwiseAbs().maxCoeff(), std::abs(difference.translation()[along]),
-          InsertionAngle(task, difference.linear())};
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(difference.linear()));
+  Eigen::Vector3d turn_rad = turn.angle() * turn.axis();
+  if (task.turns_freely) turn_rad[along] = 0.0;
+  return {across.norm(),
+          across.cwiseAbs().maxCoeff(),
+          std::abs(difference.translation()[along]),
+          InsertionAngle(task, difference.linear()),
+          across,
+          turn_rad};
 }
 
 bool WithinTolerance(const Tolerance& tolerance, const PoseError& error) {
-  return error.largest_lateral_m <= tolerance.lateral_m && error.vertical_m <= tolerance.vertical_m &&
-         error.angle_rad <= tolerance.angle_rad;
+  // Negated, so that what is not a number is not within.
+  if (!(error.vertical_m <= tolerance.vertical_m)) return false;
+  if (tolerance.one_angle() && !(error.angle_rad <= tolerance.angle_rad)) return false;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(error.across_m[axis]) <= tolerance.Lateral(axis))) return false;
+    if (!tolerance.one_angle() && !(std::abs(error.turn_rad[axis]) <= tolerance.Angle(axis))) return false;
+  }
+  return true;
 }
 
 }  // namespace feeler::execution

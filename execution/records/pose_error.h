@@ -11,6 +11,8 @@ struct PoseError {
   double largest_lateral_m = 0.0;  ///< along the worse of the two axes across it: what the tolerance is about
   double vertical_m = 0.0;         ///< along the insertion axis
   double angle_rad = 0.0;          ///< of the turns that matter to the insertion (InsertionAngle)
+  Eigen::Vector3d across_m = Eigen::Vector3d::Zero();  ///< per axis of the target, none along the insertion
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();  ///< about the axes of the target, of the turns that matter
 };
 
 /// Of the turn from one orientation to the other, 0 to pi.

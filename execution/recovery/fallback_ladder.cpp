@@ -20,9 +20,6 @@
 namespace feeler::execution {
 namespace {
 
-/// How far outside the start belief a truth is looked for, per axis: this much of the largest uncertainty that the task
-/// knows. What estimates where targets are is wrong by more than it says in proportion to what it says.
-constexpr double kBeyondUncertainty = 0.25;
 /// A refit with axes wider than this, to both sides, needs a plan; below, the confirming touches find it.
 constexpr double kNarrow_m = 0.004;
 constexpr int kRetries = 2;
@@ -39,17 +36,6 @@ constexpr double kCentreOff = 1.25;
 constexpr int kMostCells = 64;
 /// The tool comes off the mouth by this before it goes elsewhere, cells.
 constexpr double kOff = 1.5;
-
-/// Cells beyond the start belief that are looked at, along each axis.
-Cell CellsBeyond(const Task& task) {
-  const Cell largest = LargestPositionExtents(task);
-  Cell beyond;
-  for (int axis = 0; axis < 3; ++axis) {
-    beyond[axis] = largest[axis] > 1 ? static_cast<int>(std::ceil(kBeyondUncertainty * largest[axis])) : 0;
-  }
-  // An axis that counts as certain is off by a little of what the others are.
-  return beyond.cwiseMax(1);
-}
 
 void Log(const Episode& episode, const char* rung, std::string reason) {
   episode.record.FallBack(rung, std::move(reason));
@@ -198,7 +184,7 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
 
 void SweepYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
   Log(episode, rung::kYawSweep, attempt.reason);
-  const double step_rad = kSweepStep * episode.task.tolerance.angle_rad;
+  const double step_rad = kSweepStep * episode.task.tolerance.Angle(AxisOf(episode.task.insertion));
   for (double yaw_rad = step_rad; yaw_rad < kSweepMost_rad; yaw_rad += step_rad) {
     if (InsertTurned(episode, problem, yaw_rad, attempt) || InsertTurned(episode, problem, -yaw_rad, attempt)) return;
   }

@@ -210,7 +210,7 @@ Problem MakeCuboidProblem(const Task& task, std::shared_ptr<const ContactMap> ma
   problem.workspace = WorkspaceCells(task, cuboid);
   for (int axis = 0; axis < 3; ++axis) {
     const bool along_insertion = axis == AxisOf(task.insertion);
-    const double tolerance_m = along_insertion ? task.tolerance.vertical_m : task.tolerance.lateral_m;
+    const double tolerance_m = along_insertion ? task.tolerance.vertical_m : task.tolerance.Lateral(axis);
     // The truth lies half a cell around a lattice point, so a spread of k cells needs a motion that forgives (k+1)/2.
     problem.insertable_spread[axis] =
         std::max(0, static_cast<int>(std::floor(2.0 * tolerance_m / task.cell_m - 1.0 + 1e-9)));

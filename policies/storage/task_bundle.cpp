@@ -97,24 +97,26 @@ json TaskJson(const Task& task) {
                     {"max_cells", axis.max_cells}});
   }
   const MotionTimes& times = task.times;
-  return {{"name", task.name},
-          {"axes", axes},
-          {"cell_m", task.cell_m},
-          {"start_offset_m", VectorJson(task.start_offset_m)},
-          {"insertion", IndexOf(task.insertion)},
-          {"insertion_depth_m", task.insertion_depth_m},
-          {"tolerance", {task.tolerance.lateral_m, task.tolerance.vertical_m, task.tolerance.angle_rad}},
-          {"cost", {task.cost.per_cell, task.cost.per_contact, task.cost.per_action}},
-          {"beyond_per_cell", task.cost.beyond_per_cell},
-          {"force_budget_n", task.force_budget_n},
-          {"times", {times.transfer_speed_m_s, times.probe_speed_m_s, times.time_per_move_s, times.time_per_contact_s}},
-          {"goal", ToString(task.goal)},
-          {"move_lengths", task.move_lengths},
-          {"workspace_m", VectorJson(task.workspace_m)},
-          {"workspace_center_m", VectorJson(task.workspace_center_m)},
-          {"turns_freely", task.turns_freely},
-          {"world_T_target", PoseJson(task.world_T_target)},
-          {"flange_T_tool", PoseJson(task.flange_T_tool)}};
+  return {
+      {"name", task.name},
+      {"axes", axes},
+      {"cell_m", task.cell_m},
+      {"start_offset_m", VectorJson(task.start_offset_m)},
+      {"insertion", IndexOf(task.insertion)},
+      {"insertion_depth_m", task.insertion_depth_m},
+      {"tolerance", {task.tolerance.lateral_m, task.tolerance.vertical_m, task.tolerance.angle_rad}},
+      {"tolerance_beyond", {VectorJson(task.tolerance.lateral_beyond_m), VectorJson(task.tolerance.angle_beyond_rad)}},
+      {"cost", {task.cost.per_cell, task.cost.per_contact, task.cost.per_action}},
+      {"beyond_per_cell", task.cost.beyond_per_cell},
+      {"force_budget_n", task.force_budget_n},
+      {"times", {times.transfer_speed_m_s, times.probe_speed_m_s, times.time_per_move_s, times.time_per_contact_s}},
+      {"goal", ToString(task.goal)},
+      {"move_lengths", task.move_lengths},
+      {"workspace_m", VectorJson(task.workspace_m)},
+      {"workspace_center_m", VectorJson(task.workspace_center_m)},
+      {"turns_freely", task.turns_freely},
+      {"world_T_target", PoseJson(task.world_T_target)},
+      {"flange_T_tool", PoseJson(task.flange_T_tool)}};
 }
 
 AxisKind AxisOfName(const std::string& name) {
@@ -139,6 +141,10 @@ Task TaskFrom(const json& item) {
   task.insertion_depth_m = item.at("insertion_depth_m").get<double>();
   const Eigen::Vector3d tolerance = VectorOf(item.at("tolerance"));
   task.tolerance = {tolerance.x(), tolerance.y(), tolerance.z()};
+  if (item.contains("tolerance_beyond")) {  // bundles of old have one for all axes
+    task.tolerance.lateral_beyond_m = VectorOf(item["tolerance_beyond"].at(0));
+    task.tolerance.angle_beyond_rad = VectorOf(item["tolerance_beyond"].at(1));
+  }
   const Eigen::Vector3d cost = VectorOf(item.at("cost"));
   task.cost = {cost.x(), cost.y(), cost.z()};
   if (item.contains("beyond_per_cell")) {  // bundles of old have one cost per cell, and no budget

@@ -244,7 +244,11 @@ class Task:
 
     @property
     def tolerance(self) -> Result:
-        """With which error an insertion still succeeds: ``lateral_m``, ``vertical_m``, ``angle_rad``."""
+        """With which error an insertion still succeeds: ``lateral_m``, ``vertical_m``, ``angle_rad``.
+
+        Where axes of the target frame differ these are the least; all stand in ``lateral_per_axis_m``
+        (of which the two across the insertion count) and ``angle_per_axis_rad``.
+        """
         return Result(self._core.tolerance)
 
     @property

@@ -15,6 +15,12 @@ GoalKind ParseGoal(const std::string& name) {
 
 nb::object Number(double value) { return nb::float_(value); }
 
+/// A value per axis of the target frame.
+template <class ValueOf>
+nb::tuple PerAxis(const ValueOf& value_of) {
+  return nb::make_tuple(value_of(0), value_of(1), value_of(2));
+}
+
 nb::dict ResultDict(const planner::SolverResult& r, const planner::Problem& problem,
                     const planner::SolverOptions& options, const std::string& unit) {
   const auto text = [](std::string_view t) { return nb::str(t.data(), t.size()); };
@@ -118,8 +124,10 @@ void BindTask(nb::module_& m) {
                    [](const PlanningTask& t) {
                      nb::dict d;
                      d["lateral_m"] = t.task().tolerance.lateral_m;
+                     d["lateral_per_axis_m"] = PerAxis([&](int axis) { return t.task().tolerance.Lateral(axis); });
                      d["vertical_m"] = t.task().tolerance.vertical_m;
                      d["angle_rad"] = t.task().tolerance.angle_rad;
+                     d["angle_per_axis_rad"] = PerAxis([&](int axis) { return t.task().tolerance.Angle(axis); });
                      return d;
                    })
       .def_prop_ro("contact_map", [](PlanningTask& t) { return t.Setup(1, nb::none())->map; })

@@ -5,7 +5,8 @@
 //   - a probe into what holds the tool is slower by the masses, one that may meet an edge keeps the budget whatever the
 //   normal of the edge;
 //   - after a transfer that met something above the budget, transfers keep within it; before, they go at full speed;
-//   - once the plan has failed, transfers and insertions keep within it.
+//   - once the plan has failed, transfers and insertions keep within it;
+//   - ways that stay over all of the target, whose height was felt, need no care.
 #include "feeler/execution/contact/mover.h"
 
 #include <gtest/gtest.h>
@@ -151,6 +152,29 @@ TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
     mover.Fast({4.0, 3.0, 0.0}, "transfer");
     EXPECT_EQ(bench.robot.speeds_m_s.back() < bench.options.transfer_speed_m_s, !foreseen);
   }
+}
+
+TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
+  Bench bench(0.1);
+  bench.record.careful = true;
+  const double fast_m_s = bench.options.transfer_speed_m_s;
+  const auto speed_to = [&](Mover& mover, const Eigen::Vector3d& to) {
+    bench.record.startled = 5;
+    mover.Fast(to, "transfer", std::array<double, 2>{0.0, 100.0});
+    return bench.robot.speeds_m_s.back();
+  };
+  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  EXPECT_LT(speed_to(mover, {0.0, 0.0, 6.0}), fast_m_s) << "nothing was told";
+  mover.KeepClearOf(Direction::kMinusZ, 5.0);
+  EXPECT_EQ(speed_to(mover, {20.0, 0.0, 5.5}), fast_m_s);
+  EXPECT_LT(speed_to(mover, {20.0, 0.0, 4.5}), fast_m_s) << "down into it";
+  EXPECT_LT(speed_to(mover, {20.0, 9.0, 4.5}), fast_m_s) << "below";
+  EXPECT_LT(speed_to(mover, {20.0, 9.0, 8.0}), fast_m_s) << "out of it";
+  EXPECT_EQ(speed_to(mover, {20.0, 0.0, 8.0}), fast_m_s);
+  // Out is against the insertion, along any axis.
+  mover.KeepClearOf(Direction::kPlusX, 30.0);
+  EXPECT_EQ(speed_to(mover, {10.0, 0.0, 0.0}), fast_m_s);
+  EXPECT_LT(speed_to(mover, {31.0, 0.0, 0.0}), fast_m_s);
 }
 
 // The robot of the bench says so where one is none: after a surprise ways are judged at edges slanted to them.

@@ -121,6 +121,26 @@ TEST(FallbackLadder, TurnedTargetIsMeasuredAndInserted) {
   }
 }
 
+// A turned target is felt as one: the tool is not pushed at a place that its touches do not agree on.
+TEST(FallbackLadder, TouchesThatAgreeOnNoPlaceMeasureTheTurnFirst) {
+  int first = 0;
+  for (const double degrees : {-5.0, -4.4, -3.7, 3.7, 4.4, 5.0}) {
+    for (const double x_m : {-0.0043, 0.0013, 0.0037}) {
+      const Result result = RunCase({MakePose({x_m, -0.0021, 0.0009}, degrees * kDegree), {}, true});
+      EXPECT_TRUE(result.record.believed_inserted && result.inserted) << degrees << "\n" << Log(result.record);
+      if (result.record.ladder.empty() || result.record.ladder.front().rung != rung::kYawFit) continue;
+      if (!result.record.ladder.front().reason.starts_with("touches that agree on no place")) continue;
+      ++first;
+      const auto kind_at = [&](const char* kind) {
+        const auto& moves = result.record.moves;
+        return std::ranges::find(moves, kind, &MoveRecord::kind) - moves.begin();
+      };
+      EXPECT_LT(kind_at("yaw"), kind_at("insert")) << degrees << "\n" << Log(result.record);
+    }
+  }
+  EXPECT_GT(first, 0);
+}
+
 TEST(FallbackLadder, OpeningTurnedAgainstItsHousingIsFoundBySweep) {
   Case c;
   c.truth = MakePose({0.0013, -0.0021, 0.0009});
