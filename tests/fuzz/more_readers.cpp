@@ -10,6 +10,7 @@
 #include "feeler/cad/readers/read_part.h"
 #include "feeler/cad/step/read_step.h"
 #include "feeler/core/data_folder.h"
+#include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
 #include "feeler/env/arm/urdf_to_mjcf.h"
 #include "feeler/env/model/task_file.h"
@@ -77,7 +78,8 @@ void Record(std::string_view bytes) {
   nlohmann::json record;
   try {
     evaluation::ReadRecordLine(std::string(bytes), record);
-  } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch): its own kind of refusal: a fault of the page
+  } catch (const std::invalid_argument& fault) {  // its own kind of refusal: a fault that the report's page lists
+    throw InputError("line", fault.what(), "run what wrote it again");
   }
 }
 
