@@ -68,6 +68,7 @@ struct RunFlags {
   int jobs = 1;
   double confirm_limit_m = 0.0;  ///< 0: not given
   double force_budget_n = 0.0;   ///< 0: not given
+  double wrist_stiffness_n_m = 0.0;
   std::string shard;
   bool no_ladder = false;
   bool withhold_true_pose = false;
@@ -161,6 +162,7 @@ nlohmann::json SettingsJson(const RunFlags& flags, const workflow::PlanningSetup
     std::ifstream in(flags.table, std::ios::binary);
     settings["table"] = policies::HashText(std::string(std::istreambuf_iterator<char>(in), {}));
   }
+  if (flags.wrist_stiffness_n_m > 0.0) settings["wrist_stiffness_n_m"] = flags.wrist_stiffness_n_m;
   if (!setup.prior_deviation.empty()) settings["prior_deviation"] = setup.prior_deviation;
   return settings;
 }
@@ -171,6 +173,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
   const std::optional<workflow::Shard> shard = ShardOf(flags.shard);
   const workflow::Placement placement = workflow::ParsePlacement(flags.placement);
   workflow::ParseFaults(flags.noise);  // an unknown name fails before the contact map is built
+  const env::SceneOptions scene_options = SceneOptionsOf(flags.wrist_stiffness_n_m);
 
   std::shared_ptr<policies::Database> database;
   if (!flags.db.empty()) {
@@ -211,7 +214,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
   }
   options.replay = !flags.out.empty();
   options.withhold_true_pose = flags.withhold_true_pose;
-  const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
+  const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup, scene_options);
   const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, policy_factory, options); };
 
   const std::vector<std::int64_t> episodes = workflow::NumbersOfShard(0, flags.episodes, shard);
@@ -279,7 +282,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
   }
   const evaluation::RunSummary summary = evaluation::Summarize(rows);
   const auto passed = std::ranges::count_if(rows, [&](const auto& row) { return row.peak_force_n > force_budget_n; });
-  const auto speeds = workflow::NominalContactSpeeds(setup->model, force_budget_n);
+  const auto speeds = workflow::NominalContactSpeeds(setup->model, force_budget_n, scene_options);
   if (flags.json) {
     nlohmann::json json = evaluation::ToJson(summary);
     json["task"] = setup->task().name;
@@ -287,6 +290,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
     json["solved_online"] = solved_online;
     json["force_budget_n"] = force_budget_n;
     json["force_budget_passed"] = passed;
+    if (flags.wrist_stiffness_n_m > 0.0) json["wrist_stiffness_n_m"] = flags.wrist_stiffness_n_m;
     if (speeds) json["contact"] = ContactJson(*speeds);
     if (!bands.empty()) json["bands"] = bands.ToJson();
     json["noise"] = flags.noise;
@@ -347,6 +351,7 @@ void AddRunCommand(CLI::App& app, Session& session) {
       "no contact is to push harder, N: the tool comes as fast as that allows, default: the task's (25), more where "
       "the noise of the force sensor asks for it",
       false);
+  AddWristStiffness(*command, flags->wrist_stiffness_n_m);
   command->add_flag("--withhold-true-pose", flags->withhold_true_pose,
                     "leave the true pose out of what the environment tells; the records stay the same");
   AddJobs(*command, flags->jobs, "threads; the records do not depend on it");

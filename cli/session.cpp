@@ -1,11 +1,15 @@
 #include "feeler/cli/session.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <mutex>
 #include <thread>
 #include <vector>
 
 #include "feeler/cli/common/console.h"
+#include "feeler/cli/common/numbers.h"
+#include "feeler/core/error.h"
 #include "feeler/env/contact/contact_map_cache.h"
 
 namespace feeler::cli {
@@ -17,6 +21,26 @@ CLI::Option* AddShard(CLI::App& command, std::string& text, const std::string& o
       "--shard", text,
       "I/N: part I of N, from 1, of " + of +
           "; auto: as the environment of a Slurm array, OpenMPI, PBS or Kubernetes says (docs/scale.md)");
+}
+
+CLI::Option* AddWristStiffness(CLI::App& command, double& stiffness_n_m) {
+  return AddReal(
+      command, "--wrist-stiffness", stiffness_n_m, 0.0, env::Wrist::kStiffest_n_m,
+      fmt::format("the gripper holds the tool by springs along its axes, N/m, {:g} or more (docs/execution.md, "
+                  "\"Compliance in the wrist\"), default: rigidly",
+                  env::Wrist::kSoftest_n_m),
+      false);
+}
+
+env::SceneOptions SceneOptionsOf(double wrist_stiffness_n_m) {
+  if (wrist_stiffness_n_m > 0.0 && wrist_stiffness_n_m < env::Wrist::kSoftest_n_m) {
+    throw InputError("--wrist-stiffness",
+                     fmt::format("{:g} N/m: a touch takes such springs to their stops", wrist_stiffness_n_m),
+                     fmt::format("give {:g} or more, or leave it out", env::Wrist::kSoftest_n_m));
+  }
+  env::SceneOptions options;
+  options.wrist_stiffness_n_m = wrist_stiffness_n_m;
+  return options;
 }
 
 std::optional<workflow::Shard> ShardOf(const std::string& text) {

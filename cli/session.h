@@ -8,6 +8,7 @@
 
 #include "feeler/cli/common/session.h"
 #include "feeler/core/parallelism.h"
+#include "feeler/env/scene/scene.h"
 #include "feeler/planner/arrays/array_store.h"
 #include "feeler/workflow/scale/ranks.h"
 #include "feeler/workflow/scale/shard.h"
@@ -16,6 +17,10 @@ namespace feeler::cli {
 
 /// --shard I/N or auto: what of a job this process does.
 CLI::Option* AddShard(CLI::App& command, std::string& text, const std::string& of);
+/// --wrist-stiffness, 0 where it is not given.
+CLI::Option* AddWristStiffness(CLI::App& command, double& stiffness_n_m);
+/// The world as the command line wants it. Throws InputError naming the option.
+env::SceneOptions SceneOptionsOf(double wrist_stiffness_n_m);
 /// None without text. Throws InputError.
 std::optional<workflow::Shard> ShardOf(const std::string& text);
 

@@ -35,6 +35,7 @@ struct SimulatorFlags {
   std::int64_t episodes = 1;
   std::uint64_t seed = 1;
   double link_timeout_s = execution::kLinkTimeout_s;
+  double wrist_stiffness_n_m = 0.0;
   bool lockstep = false;
   bool no_replay = false;
   bool json = false;
@@ -77,6 +78,7 @@ void Simulate(const SimulatorFlags& flags, Session& session) {
   episodes.placement = workflow::ParsePlacement(flags.placement);
   episodes.force_offset_n = options.faults.bias_n;
   workflow::ParseFaults(flags.noise);  // an unknown name fails before the contact map is built
+  const env::SceneOptions scene_options = SceneOptionsOf(flags.wrist_stiffness_n_m);
 
   std::shared_ptr<policies::Database> database;
   workflow::PolicyFactory policy_factory;
@@ -100,8 +102,8 @@ void Simulate(const SimulatorFlags& flags, Session& session) {
     replay_json = [](const workflow::Replay& replay) { return nlohmann::json(evaluation::RobotReplay(replay)); };
   }
   workflow::ServedEpisodes world(
-      workflow::EpisodeRunner(setup, workflow::BuildEpisodeScene(*setup), policy_factory, episodes), flags.episodes,
-      flags.extents.empty() && flags.db.empty(), std::move(replay_json));
+      workflow::EpisodeRunner(setup, workflow::BuildEpisodeScene(*setup, scene_options), policy_factory, episodes),
+      flags.episodes, flags.extents.empty() && flags.db.empty(), std::move(replay_json));
   execution::RobotServer server(world.Robot(), options);
   Note("feeler: the simulated robot listens on {}:{}, {}\n", address.host, listener.port(),
        flags.lockstep ? "in lockstep" : "in real time");
@@ -134,6 +136,7 @@ void AddSimulateCommand(CLI::App& app, Session& session) {
   command->add_option("--db", flags->db, "draw the problems from this database; noise fall-in asks for it");
   command->add_option("--noise", flags->noise, "as of feeler run")->capture_default_str();
   command->add_option("--placement", flags->placement, "nominal or workspace, as of feeler run")->capture_default_str();
+  AddWristStiffness(*command, flags->wrist_stiffness_n_m);
   command->add_flag("--lockstep", flags->lockstep,
                     "time passes in motions alone, as fast as it can (default: in real time)");
   command->add_option("--faults", flags->faults,

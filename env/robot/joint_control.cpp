@@ -17,14 +17,15 @@ void FrictionObserver::BeforeStep(const JointVector& qd_rad_s, const JointVector
 }
 
 void FrictionObserver::AfterStep(const World& world, const JointVector& qd_rad_s, const Wrench& contact_wrench,
-                                 const Matrix6& jacobian) {
+                                 const Matrix6& jacobian, const Eigen::Vector3d& wrist_m_s2) {
   if (!options_.enabled) return;
   const double dt = world.timestep_s();
   Vector6 wrench;
   wrench << contact_wrench.force_n, contact_wrench.torque_nm;
   // What moved the joints, less what should have; positive helps, so friction comes out negative when moving forward.
-  const JointVector unexplained = world.InertiaTimes((qd_rad_s - qd_before_) / dt) -
-                                  (world.applied_torque_nm() - bias_before_ + jacobian.transpose() * wrench);
+  JointVector unexplained = world.InertiaTimes((qd_rad_s - qd_before_) / dt) -
+                            (world.applied_torque_nm() - bias_before_ + jacobian.transpose() * wrench);
+  if (!wrist_m_s2.isZero(0.0)) unexplained += world.WristReaction(wrist_m_s2);
   estimate_ += options_.bandwidth_rad_s * dt * (unexplained - estimate_);
   estimate_ = estimate_.cwiseMin(options_.limit_nm).cwiseMax(-options_.limit_nm);
 }

@@ -45,8 +45,9 @@ class FrictionObserver {
   /// Before a step: remembers what the torques should do.
   void BeforeStep(const JointVector& qd_rad_s, const JointVector& bias_nm);
   /// After it: `contact_wrench` as measured over the step, `jacobian` of the tool.
-  void AfterStep(const World& world, const JointVector& qd_rad_s, const Wrench& contact_wrench,
-                 const Matrix6& jacobian);
+  /// `wrist_m_s2`: of the tool against the arm, as the wrist measures it.
+  void AfterStep(const World& world, const JointVector& qd_rad_s, const Wrench& contact_wrench, const Matrix6& jacobian,
+                 const Eigen::Vector3d& wrist_m_s2 = Eigen::Vector3d::Zero());
   /// To be subtracted from the commanded torque, Nm.
   const JointVector& estimate_nm() const { return estimate_; }
 

@@ -88,7 +88,11 @@ void SimulatedRobot::Restore(const RobotState& state) {
   next_observation_s_ = world_.time_s();
 }
 
-Pose SimulatedRobot::ToolPose() const { return frame_.pose; }
+Pose SimulatedRobot::ToolPose() const {
+  Pose tool = frame_.pose;
+  if (scene_->wrist.stiffness_n_m > 0.0) tool.translation() += tool.linear() * world_.WristDeflection();
+  return tool;
+}
 
 void SimulatedRobot::Sense() {
   memory_.measured_q = world_.q_rad() + memory_.encoder_offset + memory_.deflection;
@@ -100,7 +104,8 @@ void SimulatedRobot::Sense() {
 
 void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
   const Matrix6 jacobian = frame_.jacobian;
-  const Pose before = frame_.pose;
+  const Pose before = ToolPose();
+  const Eigen::Vector3d wrist_m_s = world_.WristVelocity();
   memory_.friction.BeforeStep(world_.qd_rad_s(), world_.BiasTorque());
   world_.Step(torque_nm - memory_.friction.estimate_nm());
   memory_.sensor.Update(world_);
@@ -111,7 +116,8 @@ void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
         world_.timestep_s() / kLag_s * (load / memory_.noise.joint_stiffness_nm_rad - memory_.deflection);
   }
   Sense();
-  memory_.friction.AfterStep(world_, world_.qd_rad_s(), memory_.sensor.raw(), jacobian);
+  memory_.friction.AfterStep(world_, world_.qd_rad_s(), memory_.sensor.raw(), jacobian,
+                             (world_.WristVelocity() - wrist_m_s) / world_.timestep_s());
 
   ++memory_.statistics.steps;
   memory_.statistics.path_length_m += (before.translation() - memory_.tool_at_sensing.translation()).norm();
@@ -218,7 +224,7 @@ MotionResult SimulatedRobot::Follow(double duration_s, const ReferenceAt& refere
     if (t >= duration_s) {
       const Vector6 twist = frame_.jacobian * world_.qd_rad_s();
       const auto goal = reference_at(duration_s);
-      const double error_m = goal ? (MeasuredTool(goal->q_rad).translation() - ToolPose().translation()).norm() : 0.0;
+      const double error_m = goal ? (MeasuredTool(goal->q_rad).translation() - ArmPose().translation()).norm() : 0.0;
       const bool settled = error_m < options_.settle_error_m && twist.head<3>().norm() < options_.settle_speed_m_s;
       if (settled || t >= end_s) break;
     }

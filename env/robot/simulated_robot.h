@@ -121,6 +121,7 @@ class SimulatedRobot : public Robot {
              const PhysicsVariation& variation = {});
 
   // Robot:
+  /// By the encoders, and by what the wrist has given way.
   Pose ToolPose() const override;
   Wrench ContactWrench() const override { return memory_.sensor.filtered(); }
   void ZeroWrench() override;
@@ -133,7 +134,9 @@ class SimulatedRobot : public Robot {
   MotionResult Guarded(const GuardedMotion& motion) override;
   MotionResult Compliant(const CompliantMotion& motion) override;
   /// Effective mass from the inertia of the joints and the Jacobian; stiffness and damping are those of the contacts
-  /// between tool and target in MuJoCo (solref, solimp), which it makes proportional to that mass.
+  /// between tool and target in MuJoCo (solref, solimp), which it makes proportional to that mass. With a wrist the
+  /// mass is that of the tool, the stiffness that of the springs; the damping ratio covers what comes until the arm
+  /// stands.
   ContactResponse Contact(const Eigen::Vector3d& direction) const override;
   /// The wrist camera's picture of this instant. Throws InputError when the machine cannot render.
   CameraView Look() override;
@@ -186,6 +189,8 @@ class SimulatedRobot : public Robot {
   PoseTrajectory Line(const Pose& goal, double speed_m_s, double acceleration_m_s2) const;
   /// Joint references along a trajectory; slows it to the joints' speed limits. Empty when a pose is out of reach.
   std::optional<PoseTrajectory> Reachable(const PoseTrajectory& trajectory) const;
+  /// With a contact that acts on this mobility of the tool (J M^-1 J^T).
+  ContactResponse ResponseOf(const Matrix6& mobility, const Eigen::Vector3d& direction) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);
   /// A straight motion to `goal` that false contacts end, where the noise has such.
   MotionResult WatchedLine(const Pose& goal, double speed_m_s, double acceleration_m_s2, const Watch& watch);
@@ -209,6 +214,8 @@ class SimulatedRobot : public Robot {
   std::optional<MotionResult> Refused() const;
   MotionResult Guard(const std::function<MotionResult()>& motion);
   double PathDone(const Pose& start, const Eigen::Vector3d& direction, const Pose& now) const;
+  /// Where the joints have the tool, a wrist at rest: what the controllers know.
+  const Pose& ArmPose() const { return frame_.pose; }
   Pose MeasuredTool(const JointVector& q_rad) const { return ToolForwardKinematics(world_.scene(), q_rad); }
 
   RobotOptions options_;

@@ -25,7 +25,7 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
   return Guard([&] {
     const Pose start = ToolPose();
     std::vector<Pose> way_points = motion.world_T_tool;
-    way_points.insert(way_points.begin(), start);
+    way_points.insert(way_points.begin(), ArmPose());
     CartesianLimits limits;
     limits.speed_m_s = motion.speed_m_s;
     limits.acceleration_m_s2 = options_.acceleration_m_s2;

@@ -18,7 +18,7 @@ PoseTrajectory SimulatedRobot::Line(const Pose& goal, double speed_m_s, double a
   limits.acceleration_m_s2 = acceleration_m_s2;
   limits.angular_speed_rad_s = options_.angular_speed_rad_s;
   limits.angular_acceleration_rad_s2 = options_.angular_acceleration_rad_s2;
-  return PoseTrajectory({ToolPose(), goal}, limits);
+  return PoseTrajectory({ArmPose(), goal}, limits);
 }
 
 std::optional<PoseTrajectory> SimulatedRobot::Reachable(const PoseTrajectory& trajectory) const {
@@ -44,7 +44,7 @@ MotionResult SimulatedRobot::WatchedLine(const Pose& goal, double speed_m_s, dou
   const double rate = memory_.noise.false_stops_per_m;
   if (!(rate > 0.0) || watch.tool_force_n >= kUnwatched_n)
     return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
-  const Pose start = ToolPose();
+  const Pose start = ArmPose();
   const double length_m = (goal.translation() - start.translation()).norm();
   const double until_false_m = -std::log(1.0 - memory_.false_stop_random.Uniform()) / rate;
   if (until_false_m >= length_m) return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
@@ -99,7 +99,7 @@ MotionResult SimulatedRobot::Guarded(const GuardedMotion& motion) {
   RequirePositive(motion.contact_force_n, "guarded move", "the contact force (N)");
   return Guard([&] {
     const Pose start = ToolPose();
-    Pose goal = start;
+    Pose goal = ArmPose();
     goal.translation() += motion.distance_m * motion.direction;
     goal.linear() = memory_.held_orientation;
     Watch watch;
@@ -118,7 +118,7 @@ MotionResult SimulatedRobot::LinearMove(const Pose& world_T_tool, double speed_m
   RequirePositive(contact_force_n, "linear move", "the contact force (N)");
   return Guard([&] {
     const Pose start = ToolPose();
-    const Eigen::Vector3d way = world_T_tool.translation() - start.translation();
+    const Eigen::Vector3d way = world_T_tool.translation() - ArmPose().translation();
     Watch watch;
     watch.tool_force_n = contact_force_n;
     if (way.norm() > 1e-9) watch.direction = way.normalized();

@@ -62,7 +62,7 @@ MotionResult SimulatedRobot::FollowTwist(const TwistMotion& motion) {
     const Pose start = ToolPose();
     const bool goes_on = memory_.twist_reference && memory_.twist_reference->time_s == world_.time_s();
     TwistReference reference =
-        goes_on ? *memory_.twist_reference : TwistReference{world_.time_s(), start, Vector6::Zero()};
+        goes_on ? *memory_.twist_reference : TwistReference{world_.time_s(), ArmPose(), Vector6::Zero()};
     memory_.set_point.reset();
     JointVector q = q_rad();
     bool released = memory_.sensor.raw().force_n.norm() <= motion.contact_force_n;

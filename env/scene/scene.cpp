@@ -16,6 +16,7 @@
 #include "feeler/env/scene/gripper.h"
 #include "feeler/env/scene/physics_model.h"
 #include "feeler/env/scene/scene_decor.h"
+#include "feeler/env/scene/wrist.h"
 
 namespace feeler::env {
 namespace {
@@ -109,7 +110,8 @@ void AddSettings(const SceneOptions& options, XMLElement& mujoco) {
   option.SetAttribute("cone", "elliptic");
   option.SetAttribute("impratio", 10);
   XMLElement& size = *mujoco.InsertNewChildElement("size");
-  size.SetAttribute("njmax", options.max_constraints);
+  const int stops = options.wrist_stiffness_n_m > 0.0 ? 3 : 0;
+  size.SetAttribute("njmax", options.max_constraints + stops);
   size.SetAttribute("nconmax", options.max_contacts);
   // In numbers of 8 bytes. MuJoCo's own guess is 5 njmax^2, for solvers that invert the constraint space; Newton with
   // six joints used 1500 at 50 contacts.
@@ -141,6 +143,7 @@ void Check(const SceneOptions& options) {
   require(options.contact_friction >= 0.0, "negative friction", "contact_friction >= 0");
   require(options.max_constraints > 0 && options.max_contacts > 0, "no room for contacts",
           "max_constraints and max_contacts > 0");
+  RequireWrist(options);
   for (const double friction : options.joint_friction_nm) {
     require(friction >= 0.0, "negative joint friction", "joint_friction_nm >= 0");
   }
@@ -265,7 +268,7 @@ XMLElement* FindBody(XMLElement& body, const char* name) {
 }
 
 Scene Assemble(const Task& task, const std::string& task_xml, const std::string& models_folder,
-               const GripperFit& gripper, const SceneOptions& options) {
+               const GripperFit& gripper, double tool_mass_kg, const SceneOptions& options) {
   Check(options);
   const std::string where = task.file.empty() ? "task" : task.file;
   TaskDocument doc;
@@ -297,6 +300,7 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   site.SetAttribute("quat", "1 0 0 0");
   site.SetAttribute("size", 0.001);
   site.SetAttribute("group", 5);
+  AddWrist(options, task, tool_mass_kg, *doc.tool);
 
   AddCameras(options.cameras, gripper, task.flange_T_tool, Scene::kVisualGroup, *doc.mujoco, *flange);
 
@@ -313,6 +317,7 @@ Scene Assemble(const Task& task, const std::string& task_xml, const std::string&
   scene.flange_T_tool = task.flange_T_tool;
   scene.randomization = ReadRandomization(*scene.drawn_model, where);
   Index(robot.joints, robot.root_body->Attribute("name"), scene);
+  scene.wrist = FindWrist(options, *scene.model);
   constexpr double kQuarter = 0.5 * std::numbers::pi;
   scene.home_q_rad << 0.0, -kQuarter, kQuarter, -kQuarter, -kQuarter, 0.0;
   RequireKinematicsOfUrdf(scene, urdf);
@@ -343,7 +348,8 @@ Scene BuildScene(const TaskModel& task, const SceneOptions& options) {
     sized.max_constraints = capacity.rows;
     sized.max_contacts = capacity.contacts;
   }
-  return Assemble(task.task, task.xml, ModelsFolder().string(), gripper, sized);
+  return Assemble(task.task, task.xml, ModelsFolder().string(), gripper, task.model->body_subtreemass[task.tool_body],
+                  sized);
 }
 
 Scene BuildScene(const Task& task, const std::string& task_xml, const std::string& models_folder,
@@ -360,7 +366,8 @@ Scene BuildScene(const Task& task, const std::string& task_xml, const std::strin
   }
   const GripperFit gripper =
       tool_body > 0 ? FitGripper(*alone, tool_geoms, tool_body, task.flange_T_tool) : GripperFit{};
-  return Assemble(task, task_xml, models_folder, gripper, options);
+  const double tool_mass_kg = tool_body > 0 ? alone->body_subtreemass[tool_body] : 0.0;
+  return Assemble(task, task_xml, models_folder, gripper, tool_mass_kg, options);
 }
 
 void ResetScene(const Scene& scene, const JointVector& q_rad, mjData& data) {
@@ -390,6 +397,16 @@ void SetTargetPose(const Scene& scene, const Pose& world_T_target, mjData& data)
   quat[2] = q.y();
   quat[3] = q.z();
   Eigen::Map<Eigen::Vector3d>(data.mocap_pos + 3 * scene.target_mocap) = world_T_target.translation();
+}
+
+Eigen::Vector3d WristDeflection(const Scene& scene, const mjData& data) {
+  if (scene.wrist.stiffness_n_m == 0.0) return Eigen::Vector3d::Zero();
+  return {data.qpos[scene.wrist.qpos[0]], data.qpos[scene.wrist.qpos[1]], data.qpos[scene.wrist.qpos[2]]};
+}
+
+Eigen::Vector3d WristVelocity(const Scene& scene, const mjData& data) {
+  if (scene.wrist.stiffness_n_m == 0.0) return Eigen::Vector3d::Zero();
+  return {data.qvel[scene.wrist.dof[0]], data.qvel[scene.wrist.dof[1]], data.qvel[scene.wrist.dof[2]]};
 }
 
 JointVector JointPositions(const Scene& scene, const mjData& data) {

@@ -33,12 +33,28 @@ struct SceneOptions {
   int max_constraints = 200;      ///< njmax; at this value more where the parts need it
   int max_contacts = 100;         ///< nconmax; the same
   SceneCameras cameras;           ///< seen and seeing, never felt
+  /// Of the springs that the gripper holds the tool by, along each axis of the tool, N/m; 0: rigidly. See Wrist.
+  double wrist_stiffness_n_m = 0.0;
 };
 
 /// Large joints 3 Nm, wrists 1.2 Nm.
 inline constexpr std::array<double, kJointCount> kRealisticJointFriction = {3.0, 3.0, 3.0, 1.2, 1.2, 1.2};
 
-/// A compiled world: UR10e, gripper, tool (rigidly held at task.flange_T_tool), target (a mocap body, so that its pose
+/// Compliance in the wrist: the tool slides along its three axes, on springs damped critically for its mass, between
+/// stops; it cannot turn. The device is an instrumented one: the robot knows how far the tool has given way. In the
+/// nominal orientation the springs carry the weight of the tool, so that it does not sag.
+struct Wrist {
+  static constexpr double kTravel_m = 5e-3;     ///< to the stops, either way
+  static constexpr double kSoftest_n_m = 2e3;   ///< reaches the stops at twice what counts as a contact
+  static constexpr double kStiffest_n_m = 1e6;  ///< of a wrist that gives way at all
+
+  double stiffness_n_m = 0.0;  ///< 0: no wrist, the tool is held rigidly
+  double damping_n_s_m = 0.0;
+  std::array<int, 3> qpos{};  ///< addresses in qpos, along x, y, z of the tool
+  std::array<int, 3> dof{};   ///< addresses in qvel
+};
+
+/// A compiled world: UR10e, gripper, tool (held at task.flange_T_tool), target (a mocap body, so that its pose
 /// lives in mjData and one model serves all episodes), fixtures. World frame = robot base frame (`base_link`).
 ///
 /// Immutable and shared: copy the struct freely, use one mjData per thread. Actuator i is a motor on joint i with gear
@@ -77,13 +93,15 @@ struct Scene {
   JointVector home_q_rad = JointVector::Zero();  ///< arm up front, tool pointing down
   JointVector torque_limit_nm = JointVector::Zero();
   JointVector velocity_limit_rad_s = JointVector::Zero();
-  Pose flange_T_tool = Pose::Identity();
+  Pose flange_T_tool = Pose::Identity();  ///< where a wrist is at rest
+  Wrist wrist;
 };
 
 /// Assembles and compiles the scene of a loaded task. The robot comes from robots/ur10e.urdf under ModelsFolder(); a
 /// gripper between flange and tool is fitted to the tool. Global settings of the task file (<option>, <size>,
 /// <visual>) give way to those of the scene where both speak.
-/// Throws InputError when tool or target have joints, a name is used by task and robot, or the whole does not compile.
+/// Throws InputError when tool or target have joints, a name is used by task and robot, the springs of a wrist are
+/// stiffer than the time step bears with this tool, or the whole does not compile.
 Scene BuildScene(const TaskModel& task, const SceneOptions& options = {});
 
 /// The same with all inputs spelled out. `task_xml` is MJCF text with bodies `tool` and `target` directly in the
@@ -101,6 +119,10 @@ void CopyForDrawing(const Scene& scene, const mjData& state, mjData& drawn);
 /// Moves the target; call mj_forward (or step) afterwards.
 void SetTargetPose(const Scene& scene, const Pose& world_T_target, mjData& data);
 
+/// How far the tool has given way in the wrist, m, axes of the tool. Zero for a tool that is held rigidly.
+Eigen::Vector3d WristDeflection(const Scene& scene, const mjData& data);
+Eigen::Vector3d WristVelocity(const Scene& scene, const mjData& data);
+
 JointVector JointPositions(const Scene& scene, const mjData& data);
 JointVector JointVelocities(const Scene& scene, const mjData& data);
 void SetJointPositions(const Scene& scene, const JointVector& q_rad, mjData& data);
@@ -110,6 +132,7 @@ Pose TargetPose(const Scene& scene, const mjData& data);
 
 /// All joint configurations within +-pi that put the tool at `world_T_tool`; empty when out of reach.
 std::vector<JointVector> ToolInverseKinematics(const Scene& scene, const Pose& world_T_tool);
+/// With a wrist at rest.
 Pose ToolForwardKinematics(const Scene& scene, const JointVector& q_rad);
 
 }  // namespace feeler::env

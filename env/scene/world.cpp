@@ -196,17 +196,39 @@ JointVector World::BiasTorque() const {
   return bias;
 }
 
-// A scene has no degrees of freedom but the arm's, in the order of the chain, so the arrays map straight.
+// Without a wrist a scene has no degrees of freedom but the arm's, in the order of the chain, so the arrays map
+// straight. With one its slides follow them.
 JointVector World::InertiaTimes(const JointVector& v) const {
   JointVector result;
+  if (scene_->wrist.stiffness_n_m > 0.0) return Inertia() * v;
   mj_mulM(model_.get(), data_.get(), result.data(), v.data());
   return result;
 }
 
 Eigen::Matrix<double, 6, 6> World::Inertia() const {
+  if (scene_->wrist.stiffness_n_m > 0.0) return InertiaWithWrist().topLeftCorner<6, 6>();
   Eigen::Matrix<double, 6, 6> inertia;
   mj_fullM(model_.get(), inertia.data(), data_->qM);
   return inertia;
+}
+
+Eigen::Matrix<double, 9, 9> World::InertiaWithWrist() const {
+  Eigen::Matrix<double, 9, 9> all;
+  mj_fullM(model_.get(), all.data(), data_->qM);
+  return all;
+}
+
+JointVector World::WristReaction(const Eigen::Vector3d& acceleration_m_s2) const {
+  if (scene_->wrist.stiffness_n_m == 0.0) return JointVector::Zero();
+  return InertiaWithWrist().topRightCorner<6, 3>() * acceleration_m_s2;
+}
+
+Eigen::Matrix<double, 6, 6> World::ToolMobility(const Eigen::Matrix<double, 6, 6>& jacobian) const {
+  if (scene_->wrist.stiffness_n_m == 0.0) return jacobian * Inertia().inverse() * jacobian.transpose();
+  Eigen::Matrix<double, 6, 9> all = Eigen::Matrix<double, 6, 9>::Zero();
+  all.leftCols<6>() = jacobian;
+  all.topRightCorner<3, 3>() = ToolPose().linear();
+  return all * InertiaWithWrist().inverse() * all.transpose();
 }
 
 WorldState World::Save() const {

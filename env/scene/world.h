@@ -65,16 +65,24 @@ class World {
   double timestep_s() const { return model_->opt.timestep; }
   JointVector q_rad() const { return JointPositions(*scene_, *data_); }
   JointVector qd_rad_s() const { return JointVelocities(*scene_, *data_); }
+  Eigen::Vector3d WristDeflection() const { return env::WristDeflection(*scene_, *data_); }
+  Eigen::Vector3d WristVelocity() const { return env::WristVelocity(*scene_, *data_); }
   Pose ToolPose() const { return env::ToolPose(*scene_, *data_); }
   Pose TargetPose() const { return env::TargetPose(*scene_, *data_); }
   /// Tool pose in the state in which `contacts()` acted.
   const Pose& ToolPoseAtContact() const { return tool_at_contact_; }
   const std::vector<ContactForce>& contacts() const { return contacts_; }
+  // Of the arm with a wrist locked as it stands:
   /// Torques that gravity, Coriolis forces and viscous joint damping demand at present, Nm.
   JointVector BiasTorque() const;
   /// Joint-space inertia times `v` at present.
   JointVector InertiaTimes(const JointVector& v) const;
   Eigen::Matrix<double, 6, 6> Inertia() const;
+  /// Torques on the joints of the arm that a tool asks for which accelerates in the wrist, Nm.
+  JointVector WristReaction(const Eigen::Vector3d& acceleration_m_s2) const;
+  /// J M^-1 J^T of the tool, what it gives way to a wrench at once, the wrist moving with the arm; `jacobian` of the
+  /// arm's joints. World axes, linear first.
+  Eigen::Matrix<double, 6, 6> ToolMobility(const Eigen::Matrix<double, 6, 6>& jacobian) const;
   /// The torques of the last step, after clamping.
   const JointVector& applied_torque_nm() const { return applied_torque_; }
   const PhysicsVariation& variation() const { return variation_; }
@@ -87,6 +95,7 @@ class World {
 
  private:
   void Vary(const PhysicsVariation& variation);
+  Eigen::Matrix<double, 9, 9> InertiaWithWrist() const;
   void UpdatePositions();
   void GatherContacts();
   /// Lets the target give way to what pushes it, where it stands on springs.

@@ -59,8 +59,8 @@ double ForceBudget(const Task& task, const EpisodeFaults& faults, const std::opt
   return *wanted_n;
 }
 
-std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup) {
-  return std::make_shared<const env::Scene>(env::BuildScene(setup.model));
+std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup, const env::SceneOptions& options) {
+  return std::make_shared<const env::Scene>(env::BuildScene(setup.model, options));
 }
 
 EpisodeRunner::EpisodeRunner(std::shared_ptr<const PlanningSetup> setup, std::shared_ptr<const env::Scene> scene,
@@ -175,6 +175,10 @@ void EpisodeRunner::Score(EpisodeRecord& record) {
   const env::Scene& scene = world.scene();
   record.contact_parameters =
       env::ContactParameters(world.model(), scene.tool_geoms, scene.target_geoms, scene.tool_body, scene.target_body);
+  if (scene.wrist.stiffness_n_m > 0.0) {
+    record.contact_parameters["wrist_stiffness_n_m"] = scene.wrist.stiffness_n_m;
+    record.contact_parameters["wrist_damping_n_s_m"] = scene.wrist.damping_n_s_m;
+  }
   record.inserted = verdict.inserted;
   record.verdict = env::ToString(verdict.reason);
   record.depth_m = verdict.depth_m;

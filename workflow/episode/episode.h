@@ -51,7 +51,7 @@ struct EpisodeOptions {
 double ForceBudget(const Task& task, const EpisodeFaults& faults, const std::optional<double>& wanted_n);
 
 /// The world of the task's episodes: robot, tool, target, fixtures.
-std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup);
+std::shared_ptr<const env::Scene> BuildEpisodeScene(const PlanningSetup& setup, const env::SceneOptions& options = {});
 
 /// One attempt: reset, hypotheses, transfer to the start pose, localize by touch, insert, score.
 /// One object per thread; the scene is shared.

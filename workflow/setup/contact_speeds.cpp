@@ -20,8 +20,9 @@ constexpr double kOfCommanded = 0.94;
 
 }  // namespace
 
-std::optional<ContactSpeeds> NominalContactSpeeds(const env::TaskModel& model, double budget_n) {
-  env::InsertionEnv environment(std::make_shared<const env::Scene>(env::BuildScene(model)));
+std::optional<ContactSpeeds> NominalContactSpeeds(const env::TaskModel& model, double budget_n,
+                                                  const env::SceneOptions& options) {
+  env::InsertionEnv environment(std::make_shared<const env::Scene>(env::BuildScene(model, options)));
   env::ResetOptions reset;
   reset.world_T_target = model.task.world_T_target;
   reset.randomize = false;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "feeler/env/model/task_file.h"
+#include "feeler/env/scene/scene.h"
 
 namespace feeler::workflow {
 
@@ -17,7 +18,8 @@ struct ContactSpeeds {
 
 /// Of the simulated arm at the start pose of the task, rounded to 0.1 mm/s, so that plans do not hang on the last bit.
 /// Empty if the arm does not reach that pose.
-std::optional<ContactSpeeds> NominalContactSpeeds(const env::TaskModel& model, double budget_n);
+std::optional<ContactSpeeds> NominalContactSpeeds(const env::TaskModel& model, double budget_n,
+                                                  const env::SceneOptions& options = {});
 
 /// The weights in seconds that the times of the task come to, where probes go no faster than the speeds: one cost of a
 /// cell per axis. One for all where none of them is slower than the task's own probes.
