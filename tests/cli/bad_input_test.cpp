@@ -33,6 +33,7 @@ TEST(BadUsage, UnknownWordsAndValuesAreNamed) {
   ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--expansion-limit", "-1"}), "expansion");
   ExpectOneError(RunFeeler({"solve", "--problem", "/no/such/file.json"}), "/no/such/file.json");
   ExpectOneError(RunFeeler({"solve", "--task", "plug", "--extents", "2x2x2", "--seed", "-1"}), "--seed");
+  ExpectOneError(RunFeeler({"run", "--task", "plug", "--wrist-stiffness", "1000"}), "give 2000 or more");
 }
 
 TEST(BadProblemFile, EveryFaultIsNamedWithItsPlaceAndItsMend) {

@@ -34,6 +34,7 @@ std::vector<NumericOption> Options() {
           {run, "--seed", "99999999999999999999"},
           {run, "--video-episode", "-1"},
           {run, "--confirm-limit", "-0.1"},
+          {run, "--wrist-stiffness", "-1"},
           {run, "--jobs", "0"},
           {calibrate, "--frames", "2000000000"},
           {calibrate, "--poses", "2000000000"},

@@ -80,9 +80,9 @@ TEST_P(WristTest, GivesWayByForceOverStiffness) {
 
 TEST_P(WristTest, EndsAtItsStops) {
   Place({0.02, 0.02, 0.003});
-  Press({0, 0, -0.06}, 3.0);
+  Press({0, 0, -0.036}, 4.0);
   const double force_n = robot_.sensor().exact().force_n.norm();
-  EXPECT_GT(force_n, 100.0);
+  EXPECT_GT(force_n, 80.0);
   EXPECT_NEAR(robot_.world().WristDeflection().norm(), Wrist::kTravel_m, 0.1 * Wrist::kTravel_m);
 }
 
