@@ -14,13 +14,13 @@
 namespace feeler::env {
 namespace {
 
-struct Wall {
+struct Obstacle {
   Eigen::Vector3d start_m;
   Eigen::Vector3d direction;
 };
 
-const std::vector<Wall>& Walls() {
-  static const std::vector<Wall> walls = {
+const std::vector<Obstacle>& Obstacles() {
+  static const std::vector<Obstacle> walls = {
       {{0.02, 0.02, 0.0087}, -Eigen::Vector3d::UnitZ()},    {{-0.03, 0.003, 0.0061}, -Eigen::Vector3d::UnitZ()},
       {{-0.0573, -0.017, -0.02}, Eigen::Vector3d::UnitX()}, {{0.0541, 0, -0.008}, -Eigen::Vector3d::UnitX()},
       {{0.01, 0.0457, -0.01}, -Eigen::Vector3d::UnitY()},
@@ -43,7 +43,7 @@ struct Softly {
   Eigen::Vector3d InWorld(const Eigen::Vector3d& direction) const {
     return scene->task.world_T_target.linear() * direction;
   }
-  double PeakForce(const Wall& wall, double speed_m_s) {
+  double PeakForce(const Obstacle& wall, double speed_m_s) {
     Place(wall.start_m);
     GuardedMotion motion;
     motion.direction = InWorld(wall.direction);
@@ -61,7 +61,7 @@ TEST(WristForce, TheThresholdAndTheRiseBoundIt) {
   const double threshold_n = NoiseOptions{}.contact_threshold_n;
   for (int i = 0; i < 12; ++i) {
     Softly plug(random.Uniform(Wrist::kSoftest_n_m, 1.9e4));
-    for (const Wall& wall : Walls()) {
+    for (const Obstacle& wall : Obstacles()) {
       const double speed_m_s = random.Uniform(0.004, 0.05);  // of probes
       plug.Place(wall.start_m);
       const ContactResponse contact = plug.robot->Contact(plug.InWorld(wall.direction));
@@ -79,7 +79,7 @@ TEST(WristForce, TheSpeedOfABudgetKeepsIt) {
   for (const double stiffness_n_m : {2.3e3, 7.9e3, 1.87e4}) {
     Softly plug(stiffness_n_m);
     for (const double budget_n : {6.0, 10.0, 25.0}) {
-      for (const Wall& wall : Walls()) {
+      for (const Obstacle& wall : Obstacles()) {
         plug.Place(wall.start_m);
         const Eigen::Vector3d direction = plug.InWorld(wall.direction);
         const double speed_m_s = execution::SpeedWithinBudget(plug.robot->Contact(direction), budget_n);
@@ -95,7 +95,7 @@ TEST(WristForce, AnEdgeThatIsBarelyMetKeepsTheBudget) {
     Softly plug(stiffness_n_m);
     for (const double budget_n : {10.0, 25.0}) {
       for (const double overlap_m : {0.03e-3, 0.1e-3, 0.2e-3, 0.3e-3, 0.5e-3, 1e-3}) {
-        const Wall rim{{0.0, -0.0345, -overlap_m}, Eigen::Vector3d::UnitY()};
+        const Obstacle rim{{0.0, -0.0345, -overlap_m}, Eigen::Vector3d::UnitY()};
         plug.Place(rim.start_m);
         const ContactResponse face = plug.robot->Contact(plug.InWorld(rim.direction));
         const ContactResponse beyond = plug.robot->Contact(plug.InWorld(Eigen::Vector3d::UnitZ()));
