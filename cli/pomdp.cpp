@@ -3,9 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "feeler/cli/common/console.h"
 #include "feeler/cli/common/numbers.h"
@@ -15,6 +19,7 @@
 #include "feeler/core/file_output.h"
 #include "feeler/planner/pomdp/files/alpha_file.h"
 #include "feeler/planner/pomdp/files/pomdp_file.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 #include "feeler/planner/pomdp/model/simulate.h"
 #include "feeler/planner/pomdp/search/solve_pomdp.h"
 #include "feeler/policies/io/controller_json.h"
@@ -63,6 +68,25 @@ planner::PomdpSolverOptions Options(const CLI::App& command, const PomdpFlags& f
     throw InputError("--experience", "goes with --solver e-rtdp-bel", "leave it out");
   }
   return options;
+}
+
+/// The model of a file, and the wall seconds that reading it took; nothing where the time limit or Ctrl-C came first.
+std::optional<planner::Pomdp> Read(const std::string& path, double time_limit_s, const Session& session,
+                                   double& seconds) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto elapsed_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  try {
+    std::optional<planner::Pomdp> pomdp = planner::ReadPomdp(path, [&] {
+      const bool cancelled = session.cancellation != nullptr && session.cancellation->cancelled();
+      return cancelled || elapsed_s() >= time_limit_s;
+    });
+    seconds = elapsed_s();
+    return pomdp;
+  } catch (const planner::Interrupted&) {
+    return std::nullopt;
+  }
 }
 
 void RequirePolicyExtension(const std::string& out) {
@@ -116,7 +140,10 @@ struct SimulateFlags {
 void RunSimulate(const SimulateFlags& flags, Session& session) {
   if (flags.episodes < 1) throw InputError("--episodes", fmt::format("{}", flags.episodes), "give at least 1");
   if (flags.max_steps < 0) throw InputError("--max-steps", fmt::format("{}", flags.max_steps), "give at least 0");
-  const planner::Pomdp pomdp = planner::ReadPomdp(flags.pomdp);
+  double read_s = 0.0;
+  const auto read = Read(flags.pomdp, std::numeric_limits<double>::infinity(), session, read_s);
+  if (!read) throw NegativeResult(flags.pomdp, "cancelled while it was read");
+  const planner::Pomdp& pomdp = *read;
   const std::string text = policies::ReadTextFile(flags.policy, std::size_t{1} << 29);
   planner::PomdpController controller;
   std::vector<planner::FullAlphaVector> alphas;
@@ -181,8 +208,14 @@ void RunSolvePomdp(const CLI::App& command, const PomdpFlags& flags, const Solve
                    bool json, Session& session) {
   RequireOutputs({{"--out", out, FileKind::kPomdpPolicy}}, {flags.pomdp, flags.experience});
   RequirePolicyExtension(out);
-  const planner::Pomdp pomdp = planner::ReadPomdp(flags.pomdp);
+  double read_s = 0.0;
+  const bool limited = command.count("--time-limit") > 0;
+  const auto read =
+      Read(flags.pomdp, limited ? solver.time_limit_s : std::numeric_limits<double>::infinity(), session, read_s);
+  if (!read) throw NegativeResult(flags.pomdp, "the time limit, or Ctrl-C, came while it was read");
+  const planner::Pomdp& pomdp = *read;
   planner::PomdpSolverOptions options = Options(command, flags, solver, pomdp);
+  options.time_limit_s = std::max(1e-6, options.time_limit_s - read_s);
   options.cancellation = session.cancellation;
   planner::PomdpController experience;
   if (!flags.experience.empty()) {

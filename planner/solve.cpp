@@ -112,9 +112,10 @@ SolveRun::SolveRun(const Problem& problem, const SolverOptions& solver_options, 
   if (start != kNoBelief) weight = graph.Weight(start);
 }
 
-std::optional<SolverStatus> SolveRun::Stop(std::int64_t expansions) {
+std::optional<SolverStatus> SolveRun::Stop(std::int64_t expansions, std::size_t search_bytes) {
   if (stops_++ % kTableBytesEvery == 0) table_bytes_ = tables.bytes();
-  if (table_bytes_ + graph.bytes() + heuristic->bytes() > options.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+  const std::size_t bytes = table_bytes_ + graph.bytes() + heuristic->bytes() + search_bytes;
+  if (bytes > options.memory_limit_bytes) return SolverStatus::kMemoryLimit;
   return watch.Stop(expansions);
 }
 

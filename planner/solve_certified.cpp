@@ -40,9 +40,10 @@ std::function<double(BeliefId)> EstimateOf(SolveRun& run) {
 }
 
 /// The stop condition while there is no policy yet.
-std::function<std::optional<SolverStatus>(std::int64_t)> FirstPolicyStop(SolveRun& run) {
-  return [&run](std::int64_t expansions) {
-    const std::optional<SolverStatus> why = run.Stop(expansions);
+template <class Search>
+std::function<std::optional<SolverStatus>(std::int64_t)> FirstPolicyStop(SolveRun& run, const Search& search) {
+  return [&run, &search](std::int64_t expansions) {
+    const std::optional<SolverStatus> why = run.Stop(expansions, search.bytes());
     const bool budget = why == SolverStatus::kTimeLimit || why == SolverStatus::kExpansionLimit;
     return run.options.first_policy_in_any_case && budget ? std::nullopt : why;
   };
@@ -50,7 +51,7 @@ std::function<std::optional<SolverStatus>(std::int64_t)> FirstPolicyStop(SolveRu
 
 /// The greedy policy. False, and says why in the result, if some hypotheses cannot be told apart or it was stopped.
 bool Complete(SolveRun& run, Greedy& greedy) {
-  const auto why = greedy.Run(run.start, FirstPolicyStop(run));
+  const auto why = greedy.Run(run.start, FirstPolicyStop(run, greedy));
   run.result.expansions = greedy.expansions();
   if (!why) return true;
   run.result.status = *why;
@@ -63,11 +64,11 @@ bool Complete(SolveRun& run, Greedy& greedy) {
 
 /// Further policies while the gap is open, with up to half of the budget: with orientations the first may be far off.
 void Improve(SolveRun& run, Greedy& greedy) {
-  const auto stop = [&run](std::int64_t expansions) -> std::optional<SolverStatus> {
+  const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
     if (run.watch.expansions_before() + expansions >= run.options.expansion_limit / 2) {
       return SolverStatus::kExpansionLimit;
     }
-    return run.Stop(expansions);
+    return run.Stop(expansions, greedy.bytes());
   };
   for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
     if (greedy.Value(run.start) <= run.options.gap * run.result.lower_bound * run.weight) return;
@@ -85,7 +86,7 @@ void CloseGap(SolveRun& run, Incumbent& incumbent) {
     const double upper = search.Upper(run.start) / run.weight;
     if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
     if (upper <= run.options.gap * lower()) return SolverStatus::kGap;
-    return run.Stop(expansions);
+    return run.Stop(expansions, search.bytes() + incumbent.bytes());
   });
   result.lower_bound = lower();
   result.trials = search.trials();
@@ -117,7 +118,7 @@ void SolveWithOpenings(SolveRun& run, const Problem& filled, Greedy& greedy) {
   const auto heuristic = tables.tables->MakeHeuristic(filled, filled_graph.sets());
   filled_graph.SetHeuristic(heuristic.get());
   OpenPolicy open(run.graph, filled_graph, *tables.bound, greedy);
-  const auto why = open.Run(run.start, FirstPolicyStop(run));
+  const auto why = open.Run(run.start, FirstPolicyStop(run, open));
   run.result.expansions = open.expansions();
   const bool small = run.graph.sets().info(run.graph.set(run.start)).size <= kGreedyBesideOpen;
   if (why && !open.Solved(run.start)) {

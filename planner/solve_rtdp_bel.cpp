@@ -18,7 +18,7 @@ void Search(SolveRun& run, Initial initial) {
   };
   const auto why = search.Run(run.start, [&](std::int64_t expansions) {
     if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), std::numeric_limits<double>::infinity());
-    return run.Stop(expansions);
+    return run.Stop(expansions, search.bytes());
   });
   run.result.lower_bound = lower();
   run.result.trials = search.trials();

@@ -22,8 +22,8 @@ struct SolveRun {
   SolveRun(const SolveRun&) = delete;
   SolveRun& operator=(const SolveRun&) = delete;
 
-  /// Why to stop now, after so many expansions of this attempt; empty to go on.
-  std::optional<SolverStatus> Stop(std::int64_t expansions);
+  /// Why to stop now, after so many expansions of this attempt and with so much memory in the searches; empty to go on.
+  std::optional<SolverStatus> Stop(std::int64_t expansions, std::size_t search_bytes);
   /// Reports a row of the bounds table; `expansions` of this attempt.
   void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) const;
 

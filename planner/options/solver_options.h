@@ -57,8 +57,8 @@ struct SolverOptions {
   /// end. True: it is completed whatever time, CPU time and expansions it takes (not against cancellation and memory);
   /// for who needs some policy at any budget.
   bool first_policy_in_any_case = false;
-  /// Stop when the belief store (about 1 kB an expansion), what the heuristic has cached and the tables together, which
-  /// all problems of a family share, have grown to this.
+  /// Stop when the belief store (about 1 kB an expansion), the values that the searches keep, what the heuristic has
+  /// cached and the tables together, which all problems of a family share, have grown to this.
   std::size_t memory_limit_bytes = std::size_t{1} << 32;
   std::uint64_t seed = 1;
   HeuristicKind heuristic = HeuristicKind::kCertificate;

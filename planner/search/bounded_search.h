@@ -61,6 +61,8 @@ class BoundedSearch {
   /// False where the best policy found is the incumbent's.
   bool Improved(Belief b) { return Node(b).action >= 0; }
   std::int64_t trials() const { return trials_; }
+  /// Of its own, without the model's and the incumbent's.
+  std::size_t bytes() const { return nodes_.capacity() * sizeof(State); }
   std::int64_t expansions() const { return expansions_ + incumbent_.expansions(); }
 
  private:

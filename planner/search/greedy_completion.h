@@ -84,6 +84,8 @@ class GreedyCompletion {
   int Action(Belief b) const { return nodes_[b].action; }
   std::int64_t expansions() const { return expansions_; }
   std::int64_t trials() const { return 0; }
+  /// Of its own, without the model's; plans in work left out.
+  std::size_t bytes() const { return nodes_.capacity() * sizeof(State); }
 
  private:
   struct State {

@@ -45,6 +45,11 @@ class OpenPolicy {
   /// On the map itself: those on the filled map are not counted.
   std::int64_t expansions() const { return expansions_ + completion_.expansions(); }
   std::int64_t trials() const { return 0; }
+  /// With those of the filled map's graph and policies.
+  std::size_t bytes() const {
+    return nodes_.capacity() * sizeof(State) + found_.capacity() + filled_.bytes() + filled_policy_.bytes() +
+           completion_.bytes();
+  }
 
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -65,6 +65,8 @@ class RtdpBel {
   std::int64_t expansions() const { return expansions_; }
   std::int64_t trials() const { return trials_; }
   std::int64_t updates() const { return updates_; }
+  /// Of its own, without the model's.
+  std::size_t bytes() const { return nodes_.capacity() * sizeof(State); }
 
  private:
   static constexpr Belief kGoalOrSolved = ~Belief{0};

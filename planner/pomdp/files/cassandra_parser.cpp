@@ -38,7 +38,8 @@ struct Range {
 
 class Parser {
  public:
-  Parser(std::string_view text, const std::string& name) : tokens_(text, name), name_(name) {}
+  Parser(std::string_view text, const std::string& name, const std::function<bool()>& stop)
+      : pulse_(stop), tokens_(text, name, &pulse_), name_(name) {}
 
   Pomdp Parse() {
     while (!tokens_.done()) Statement();
@@ -221,7 +222,10 @@ class Parser {
 
   void AssignAll(RowsBuilder& rows, const Range& a, const Range& s, const std::vector<SparseEntry>& row) {
     RequireSpace(static_cast<double>(a.end - a.begin) * (s.end - s.begin) * static_cast<double>(row.size()));
-    ForEachRow(a, s, [&](std::size_t i) { rows.Assign(i, row, tokens_.line()); });
+    ForEachRow(a, s, [&](std::size_t i) {
+      pulse_(row.size() + 10);
+      rows.Assign(i, row, tokens_.line());
+    });
   }
 
   void Transition() { Table(*transitions_, states_, true); }
@@ -260,10 +264,16 @@ class Parser {
     if (to.all) {
       if (p != 0.0)
         RequireSpace(static_cast<double>(a.end - a.begin) * (s.end - s.begin) * static_cast<double>(columns.count));
-      ForEachRow(a, s, [&](std::size_t i) { rows.Fill(i, p, tokens_.line()); });
+      ForEachRow(a, s, [&](std::size_t i) {
+        pulse_(columns.count);
+        rows.Fill(i, p, tokens_.line());
+      });
     } else {
       RequireSpace(static_cast<double>(a.end - a.begin) * (s.end - s.begin));
-      ForEachRow(a, s, [&](std::size_t i) { rows.Set(i, to.begin, p, tokens_.line()); });
+      ForEachRow(a, s, [&](std::size_t i) {
+        pulse_(10);
+        rows.Set(i, to.begin, p, tokens_.line());
+      });
     }
   }
 
@@ -341,9 +351,10 @@ class Parser {
     }
     RowsBuilder row(1, states_.count);
     row.Assign(0, Row(states_.count, false), start_line_);
-    const SparseRows finished = row.Finish([&](std::size_t, double sum, int line) {
+    const auto fail = [&](std::size_t, double sum, int line) {
       tokens_.FailAt(line, fmt::format("the probabilities of start sum to {:.6g}, not 1", sum), "mend them");
-    });
+    };
+    const SparseRows finished = row.Finish(fail, pulse_);
     start_ = finished.entries;
   }
 
@@ -366,14 +377,14 @@ class Parser {
             line > 0 ? "mend the row" : "give the row");
       };
     };
-    pomdp.transitions = transitions_->Finish(fail("T", "state before"));
+    pomdp.transitions = transitions_->Finish(fail("T", "state before"), pulse_);
     if (mdp_) {
       for (std::size_t i = 0; i < actions_.count * states_.count; ++i) {
         observation_rows_->Assign(i, {{static_cast<std::uint32_t>(i % states_.count), 1.0}}, 0);
       }
     }
-    pomdp.observation_rows = observation_rows_->Finish(fail("O", "state on arrival"));
-    pomdp.reward = rewards_->Expected(pomdp.transitions, pomdp.observation_rows);
+    pomdp.observation_rows = observation_rows_->Finish(fail("O", "state on arrival"), pulse_);
+    pomdp.reward = rewards_->Expected(pomdp.transitions, pomdp.observation_rows, pulse_);
     pomdp.start = start_ ? *start_ : Uniform(states_.count);
     if (*discount_ == 1.0 && first_gain_line_ > 0 && first_loss_line_ > 0) {
       tokens_.FailAt(
@@ -394,6 +405,7 @@ class Parser {
     return pomdp;
   }
 
+  Pulse pulse_;
   CassandraTokens tokens_;
   std::string name_;
   std::optional<double> discount_;
@@ -407,6 +419,8 @@ class Parser {
 
 }  // namespace
 
-Pomdp ParseCassandraPomdp(std::string_view text, const std::string& name) { return Parser(text, name).Parse(); }
+Pomdp ParseCassandraPomdp(std::string_view text, const std::string& name, const std::function<bool()>& stop) {
+  return Parser(text, name, stop).Parse();
+}
 
 }  // namespace feeler::planner

@@ -24,7 +24,8 @@ std::string Shown(std::string_view word) {
 
 }  // namespace
 
-CassandraTokens::CassandraTokens(std::string_view text, std::string name) : name_(std::move(name)), text_(text) {
+CassandraTokens::CassandraTokens(std::string_view text, std::string name, Pulse* pulse)
+    : name_(std::move(name)), pulse_(pulse), text_(text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
 }
@@ -51,6 +52,8 @@ bool CassandraTokens::Ahead(std::size_t count) const {
 
 std::string_view CassandraTokens::Next(std::string_view wanted) {
   if (done()) Fail(fmt::format("the file ends where {} should be", wanted), "is the file complete?");
+  constexpr std::size_t kWordWork = 20;
+  if (pulse_ != nullptr) (*pulse_)(kWordWork);
   const Token token = ahead_.front();
   ahead_.pop_front();
   line_ = token.line;

@@ -5,12 +5,15 @@
 #include <string>
 #include <string_view>
 
+#include "feeler/planner/pomdp/model/pulse.h"
+
 namespace feeler::planner {
 
 /// Words of Cassandra's format, with their lines. `:` and `*` are words of their own; `#` begins a comment.
 class CassandraTokens {
  public:
-  CassandraTokens(std::string_view text, std::string name);
+  /// `pulse` may be null; it is told of each word.
+  CassandraTokens(std::string_view text, std::string name, Pulse* pulse = nullptr);
 
   bool done() const { return !Ahead(0); }
   /// The word `ahead` of the next one; empty past the end.
@@ -41,6 +44,7 @@ class CassandraTokens {
   bool Ahead(std::size_t count) const;
 
   std::string name_;
+  Pulse* pulse_;
   std::string_view text_;
   int line_ = 1;
   // Files may have tens of millions of words: they are cut out as they are asked for.

@@ -74,8 +74,9 @@ double Product(const std::vector<FactorVariable>& variables, const std::vector<s
 
 class Joiner {
  public:
-  explicit Joiner(const FactoredPomdp& factored)
+  Joiner(const FactoredPomdp& factored, Pulse& pulse)
       : factored_(factored),
+        pulse_(pulse),
         before_(Members([](const auto& s) { return s.before; })),
         after_(Members([](const auto& s) { return s.after; })),
         states_(factored.variables, after_),
@@ -137,6 +138,8 @@ class Joiner {
   /// Calls f(probability) for each joint value of the targets of `tables`, with the assignment in at_.
   void ForEach(const std::vector<const FactorTable*>& tables, std::size_t from, double probability,
                const std::function<void(double)>& f) {
+    constexpr std::size_t kTableWork = 200;
+    pulse_(kTableWork);
     if (from == tables.size()) return f(probability);
     const FactorTable& table = *tables[from];
     std::vector<SparseEntry> distribution;
@@ -272,6 +275,7 @@ class Joiner {
   }
 
   const FactoredPomdp& factored_;
+  Pulse& pulse_;
   std::vector<std::size_t> before_, after_;
   JointValues states_, observations_;
   Assignment at_;
@@ -285,6 +289,6 @@ class Joiner {
 
 }  // namespace
 
-Pomdp Join(const FactoredPomdp& factored) { return Joiner(factored).Run(); }
+Pomdp Join(const FactoredPomdp& factored, Pulse& pulse) { return Joiner(factored, pulse).Run(); }
 
 }  // namespace feeler::planner

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "feeler/planner/pomdp/files/factor_table.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 
@@ -27,6 +28,6 @@ struct FactoredPomdp {
 
 /// The joint model of the states that can be met from the initial belief. Throws InputError at `NAME:LINE` of the table
 /// whose probabilities do not sum to 1, or if the model would not fit.
-Pomdp Join(const FactoredPomdp& factored);
+Pomdp Join(const FactoredPomdp& factored, Pulse& pulse);
 
 }  // namespace feeler::planner

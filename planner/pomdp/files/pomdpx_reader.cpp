@@ -29,7 +29,7 @@ std::vector<std::string> Words(const char* text) {
 class Reader {
  public:
   /// Fills `model`, whose tables then refer to its variables: it must stay where it is.
-  explicit Reader(FactoredPomdp& model) : model_(model) {}
+  Reader(FactoredPomdp& model, Pulse& pulse) : model_(model), pulse_(pulse) {}
 
   void Read(std::string_view text) {
     tinyxml2::XMLDocument document;
@@ -285,8 +285,10 @@ class Reader {
            "give one for each value of each -");
     }
     if (uniform && !probability) Fail(*values, "uniform rewards", "give numbers");
+    pulse_(kNumberWork * numbers.size());
     const double share = probability ? 1.0 / static_cast<double>(model_.variables[scope.back()].count()) : 0.0;
     for (std::size_t n = 0; n < static_cast<std::size_t>(count); ++n) {
+      pulse_(kNumberWork);
       std::size_t rest = n;
       for (std::size_t i = listed.size(); i-- > 0;) {
         at[listed[i]] = static_cast<std::uint32_t>(rest % size(i));
@@ -428,7 +430,9 @@ class Reader {
     for (const std::size_t o : model_.observations) require(model_.sensors, o, "ObsFunction");
   }
 
+  static constexpr std::size_t kNumberWork = 50;  ///< of a number of a table
   FactoredPomdp& model_;
+  Pulse& pulse_;
   std::map<std::string, std::size_t> index_;
   std::vector<std::map<std::string, std::uint32_t>> numbers_;
   std::vector<char> scope_of_;
@@ -437,11 +441,12 @@ class Reader {
 
 }  // namespace
 
-Pomdp ParsePomdpx(std::string_view text, const std::string& name) {
+Pomdp ParsePomdpx(std::string_view text, const std::string& name, const std::function<bool()>& stop) {
+  Pulse pulse(stop);
   FactoredPomdp factored;
   factored.name = name;
-  Reader(factored).Read(text);
-  Pomdp pomdp = Join(factored);
+  Reader(factored, pulse).Read(text);
+  Pomdp pomdp = Join(factored, pulse);
   if (pomdp.discount < 1.0) return pomdp;
   pomdp.name = fmt::format("{}:{}", name, factored.discount_line);
   RequireSolvable(pomdp);

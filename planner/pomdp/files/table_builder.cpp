@@ -30,11 +30,12 @@ void RowsBuilder::Assign(std::size_t row, std::vector<SparseEntry> entries, int 
   lines_[row] = line;
 }
 
-SparseRows RowsBuilder::Finish(const std::function<void(std::size_t, double, int)>& fail) {
+SparseRows RowsBuilder::Finish(const std::function<void(std::size_t, double, int)>& fail, Pulse& pulse) {
   SparseRows finished;
   std::vector<SparseEntry> kept;
   for (std::size_t row = 0; row < rows_.size(); ++row) {
     std::vector<SparseEntry>& entries = rows_[row];
+    pulse(20 * entries.size() + 10);
     std::ranges::stable_sort(entries, {}, &SparseEntry::index);
     kept.clear();
     double sum = 0.0;
@@ -92,23 +93,27 @@ unsigned RewardStatements::Detail(std::uint32_t a, std::uint32_t s) const {
   return detail;
 }
 
-std::vector<double> RewardStatements::Expected(const SparseRows& transitions,
-                                               const SparseRows& observation_rows) const {
+std::vector<double> RewardStatements::Expected(const SparseRows& transitions, const SparseRows& observation_rows,
+                                               Pulse& pulse) const {
+  const auto look = [&] { pulse(10 + 20 * static_cast<std::size_t>(std::ranges::count(patterns_, true))); };
   std::vector<double> expected(actions_ * states_, 0.0);
   for (std::uint32_t a = 0; a < actions_; ++a) {
     for (std::uint32_t s = 0; s < states_; ++s) {
       double& sum = expected[a * states_ + s];
+      look();
       const unsigned detail = Detail(a, s);
       if (detail == 0) {
         sum = Find(a, s, 0, 0);
         continue;
       }
       for (const SparseEntry& next : transitions.Row(a * states_ + s)) {
+        look();
         if ((detail & 2U) == 0) {
           sum += next.value * Find(a, s, next.index, 0);
           continue;
         }
         for (const SparseEntry& o : observation_rows.Row(a * states_ + next.index)) {
+          look();
           sum += next.value * o.value * Find(a, s, next.index, o.index);
         }
       }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 
@@ -26,7 +27,7 @@ class RowsBuilder {
   std::size_t entries() const { return entries_; }
 
   /// The rows, normalised. `fail(row, sum, line)` must throw; called where a row does not sum to 1.
-  SparseRows Finish(const std::function<void(std::size_t row, double sum, int line)>& fail);
+  SparseRows Finish(const std::function<void(std::size_t row, double sum, int line)>& fail, Pulse& pulse);
 
  private:
   std::size_t columns_;
@@ -49,7 +50,7 @@ class RewardStatements {
   void Set(std::uint32_t action, std::uint32_t from, std::uint32_t to, std::uint32_t observation, double value);
   std::size_t size() const { return statements_.size(); }
   /// R(a, s), expected over s' and o, for all actions and states (At(a, s) = a |S| + s).
-  std::vector<double> Expected(const SparseRows& transitions, const SparseRows& observation_rows) const;
+  std::vector<double> Expected(const SparseRows& transitions, const SparseRows& observation_rows, Pulse& pulse) const;
 
  private:
   struct Statement {

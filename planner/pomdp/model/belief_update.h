@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 
@@ -12,7 +13,9 @@ namespace feeler::planner {
 /// Impossible ones are left out.
 class BeliefUpdate {
  public:
-  explicit BeliefUpdate(const Pomdp& pomdp) : pomdp_(pomdp), parts_(pomdp.observation_count()) {}
+  /// `pulse` (may be null) may interrupt an update; the object is of no use then.
+  explicit BeliefUpdate(const Pomdp& pomdp, Pulse* pulse = nullptr)
+      : pomdp_(pomdp), pulse_(pulse), parts_(pomdp.observation_count()) {}
 
   template <class F>
   void operator()(std::span<const SparseEntry> belief, std::size_t action, F f) {
@@ -33,6 +36,7 @@ class BeliefUpdate {
   void Collect(std::span<const SparseEntry> belief, std::size_t action);
 
   const Pomdp& pomdp_;
+  Pulse* pulse_;
   std::vector<std::vector<SparseEntry>> parts_;
   std::vector<std::uint32_t> seen_;
   std::vector<SparseEntry> moved_;

@@ -9,6 +9,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/model/goal_costs.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 namespace {
@@ -23,7 +24,8 @@ struct System {
   std::vector<double> reward;
   std::vector<std::uint8_t> final;  ///< of goals: value 0
 
-  explicit System(const Pomdp& pomdp, const PomdpController& controller) {
+  System(const Pomdp& pomdp, const PomdpController& controller, Pulse& pulse) {
+    constexpr std::size_t kPairWork = 50;  // see Pulse
     const std::vector<std::uint8_t> absorbing = AbsorbingStates(pomdp);
     std::unordered_map<std::uint64_t, std::uint32_t> number;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
@@ -43,7 +45,9 @@ struct System {
       reward.push_back(absorbing[s] != 0 ? 0.0 : pomdp.reward[pomdp.At(node.action, s)]);
       if (absorbing[s] == 0) {
         for (const SparseEntry& next : pomdp.transitions.Row(pomdp.At(node.action, s))) {
-          for (const SparseEntry& o : pomdp.observation_rows.Row(pomdp.At(node.action, next.index))) {
+          const auto seen = pomdp.observation_rows.Row(pomdp.At(node.action, next.index));
+          pulse(kPairWork * seen.size());
+          for (const SparseEntry& o : seen) {
             row.push_back({of(controller.Next(n, o.index), next.index), pomdp.discount * next.value * o.value});
           }
         }
@@ -61,9 +65,12 @@ std::uint32_t PomdpController::Next(std::uint32_t node, std::uint32_t observatio
   return found != branches.end() && found->observation == observation ? found->next : nodes[node].otherwise;
 }
 
-std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
-                                                  const std::function<bool()>& stop) {
-  System system(pomdp, controller);
+namespace {
+
+std::optional<ControllerValue> Evaluate(const Pomdp& pomdp, const PomdpController& controller,
+                                        const std::function<bool()>& stop) {
+  Pulse pulse(stop);
+  System system(pomdp, controller, pulse);
   ControllerValue result;
   result.unknowns = system.reward.size();
   std::vector<double> values(result.unknowns, 0.0);
@@ -93,6 +100,17 @@ std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const Pomd
   // Sweeps are monotone, and take a constant off by discount times it at least: later ones fall by ever less.
   result.value -= fall * pomdp.discount / (1.0 - pomdp.discount);
   return result;
+}
+
+}  // namespace
+
+std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
+                                                  const std::function<bool()>& stop) {
+  try {
+    return Evaluate(pomdp, controller, stop);
+  } catch (const Interrupted&) {
+    return std::nullopt;
+  }
 }
 
 void Validate(const Pomdp& pomdp, const PomdpController& controller, const std::string& where) {

@@ -36,8 +36,8 @@ struct ControllerValue {
 };
 
 /// Exact evaluation by the linear system V(n, s) = R(a_n, s) + discount sum P(s', o | s, a_n) V(next(n, o), s'), over
-/// the pairs that can be met, by Gauss-Seidel sweeps. `stop` may cut them short: then `value` is the lower; without
-/// discount (GoalCosts) there may be none.
+/// the pairs that can be met, by Gauss-Seidel sweeps. `stop` may cut them short: then `value` is the lower; before a
+/// sweep is done, and without discount (GoalCosts), there may be none.
 std::optional<ControllerValue> EvaluateController(const Pomdp& pomdp, const PomdpController& controller,
                                                   const std::function<bool()>& stop = {});
 

@@ -1,18 +1,20 @@
 #include "feeler/planner/pomdp/model/goal_costs.h"
 
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
 
+#include "feeler/planner/pomdp/model/elimination.h"
+#include "feeler/planner/pomdp/model/pulse.h"
+
 namespace feeler::planner {
 namespace {
 
 constexpr double kGoalPrecision = 1e-12;
-constexpr int kSweepsBeforeLu = 300;
+constexpr int kSweepsBeforeElimination = 300;
 constexpr int kGoalSweeps = 100000;
-constexpr std::size_t kMostForLu = 20000;
+constexpr std::size_t kMostEliminated = 20000;
 
 /// Marks all that can come to what is marked.
 void SpreadBackwards(const GoalChain& chain, std::vector<std::uint8_t>& marked) {
@@ -58,12 +60,18 @@ class GoalSystem {
     for (std::uint32_t i = 0; i < states_.size(); ++i) {
       row.clear();
       double leaves = 0.0;  // summed up itself: 1 - what stays would be rounding where that is almost 1
+      double to_goal = 0.0;
       for (const SparseEntry& next : chain.rows.Row(states_[i])) {
         if (number[next.index] == i) continue;
         leaves += next.value;
-        if (number[next.index] != kNone) row.push_back({number[next.index], next.value});
+        if (number[next.index] != kNone) {
+          row.push_back({number[next.index], next.value});
+        } else {
+          to_goal += next.value;
+        }
       }
       leaves_.push_back(leaves);
+      to_goal_.push_back(to_goal);
       rows_.Append(row);
       cost_.push_back(chain.cost[states_[i]]);
     }
@@ -72,9 +80,14 @@ class GoalSystem {
   }
 
   void Solve(const std::function<bool()>& stop) {
-    for (int sweep = 0; sweep < kGoalSweeps; ++sweep) {
-      if (Sweep() || (stop && stop())) return;
-      if (sweep == kSweepsBeforeLu && states_.size() <= kMostForLu) return Direct();
+    Pulse pulse(stop);
+    try {
+      for (int sweep = 0; sweep < kGoalSweeps; ++sweep) {
+        if (Sweep(pulse)) return;
+        if (sweep == kSweepsBeforeElimination && states_.size() <= kMostEliminated && Eliminate(pulse)) return;
+      }
+    } catch (const Interrupted&) {
+      // Bound() says what the sweeps have come to.
     }
   }
 
@@ -101,9 +114,10 @@ class GoalSystem {
   }
 
   /// True if nothing changes any more. Backwards: successors come after what leads to them, mostly.
-  bool Sweep() {
+  bool Sweep(Pulse& pulse) {
     double change = 0.0;
     for (std::size_t i = states_.size(); i-- > 0;) {
+      pulse(2 * rows_.Row(i).size() + 20);
       double value = cost_[i];
       double steps = 1.0;
       for (const SparseEntry& next : rows_.Row(i)) {
@@ -119,32 +133,18 @@ class GoalSystem {
     return change <= kGoalPrecision;
   }
 
-  void Direct() {
-    const auto size = static_cast<Eigen::Index>(states_.size());
-    std::vector<Eigen::Triplet<double>> entries;
-    Eigen::MatrixXd right(size, 2);
-    for (Eigen::Index i = 0; i < size; ++i) {
-      const auto state = static_cast<std::size_t>(i);
-      entries.emplace_back(i, i, leaves_[state]);
-      for (const SparseEntry& next : rows_.Row(state)) entries.emplace_back(i, next.index, -next.value);
-      right(i, 0) = cost_[state];
-      right(i, 1) = 1.0;
-    }
-    Eigen::SparseMatrix<double> matrix(size, size);
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(matrix);
-    if (lu.info() != Eigen::Success) return;
-    Eigen::MatrixXd solution = lu.solve(right);
-    solution += lu.solve(right - matrix * solution);
-    for (Eigen::Index i = 0; i < size; ++i) {
-      values_[static_cast<std::size_t>(i)] = solution(i, 0);
-      steps_[static_cast<std::size_t>(i)] = solution(i, 1);
-    }
+  /// False where it would take too much memory.
+  bool Eliminate(Pulse& pulse) {
+    const auto solved = EliminateStates(rows_, to_goal_, cost_, pulse);
+    if (!solved) return false;
+    values_ = solved->cost;
+    steps_ = solved->steps;
+    return true;
   }
 
   std::vector<std::uint32_t> states_;
   SparseRows rows_;
-  std::vector<double> leaves_, cost_;
+  std::vector<double> leaves_, to_goal_, cost_;
   std::vector<double> values_, steps_;
 };
 

@@ -4,10 +4,13 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "feeler/planner/pomdp/model/pulse.h"
+
 namespace feeler::planner {
 namespace {
 
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
+constexpr std::size_t kOutcomeWork = 8;  ///< see Pulse
 
 class UnionFind {
  public:
@@ -40,12 +43,13 @@ void ForEachOutcome(const Pomdp& pomdp, std::size_t a, std::uint32_t s, F f) {
 
 /// Joins what the states of one group can become by the same action and observation. True if anything changed.
 bool JoinSuccessors(const Pomdp& pomdp, const std::vector<std::uint32_t>& group, UnionFind& sets,
-                    std::vector<std::uint8_t>& reached, std::vector<std::uint32_t>& first) {
+                    std::vector<std::uint8_t>& reached, std::vector<std::uint32_t>& first, Pulse& pulse) {
   bool changed = false;
   std::vector<std::uint32_t> seen;
   for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
     for (const std::uint32_t s : group) {
       ForEachOutcome(pomdp, a, s, [&](std::uint32_t next, std::uint32_t o, double) {
+        pulse(kOutcomeWork);
         if (reached[next] == 0) reached[next] = 1, changed = true;
         if (first[o] == kNone) {
           first[o] = next;
@@ -63,11 +67,12 @@ bool JoinSuccessors(const Pomdp& pomdp, const std::vector<std::uint32_t>& group,
 
 std::vector<ClassOutcome> Outcomes(const Pomdp& pomdp, std::size_t a, const std::vector<std::uint32_t>& states,
                                    const std::vector<std::uint32_t>& class_of,
-                                   const std::vector<std::uint32_t>& position) {
+                                   const std::vector<std::uint32_t>& position, Pulse& pulse) {
   std::vector<ClassOutcome> outcomes;
   std::unordered_map<std::uint32_t, std::size_t> of;
   for (std::uint32_t from = 0; from < states.size(); ++from) {
     ForEachOutcome(pomdp, a, states[from], [&](std::uint32_t next, std::uint32_t o, double p) {
+      pulse(kOutcomeWork);
       const auto [found, added] = of.try_emplace(o, outcomes.size());
       if (added) outcomes.push_back({o, class_of[next], {}});
       outcomes[found->second].steps.push_back({from, position[next], p});
@@ -77,47 +82,32 @@ std::vector<ClassOutcome> Outcomes(const Pomdp& pomdp, std::size_t a, const std:
   return outcomes;
 }
 
-/// Joins until nothing changes. False if stopped.
-bool JoinAll(const Pomdp& pomdp, const std::vector<std::uint32_t>& root, UnionFind& sets,
-             std::vector<std::vector<std::uint32_t>>& groups, const std::function<bool()>& stop) {
+/// Joins until nothing changes.
+void JoinAll(const Pomdp& pomdp, const std::vector<std::uint32_t>& root, UnionFind& sets,
+             std::vector<std::vector<std::uint32_t>>& groups, Pulse& pulse) {
   std::vector<std::uint8_t> reached(pomdp.state_count(), 0);
   std::vector<std::uint32_t> first(pomdp.observation_count(), kNone);
-  JoinSuccessors(pomdp, root, sets, reached, first);
+  JoinSuccessors(pomdp, root, sets, reached, first, pulse);
   for (bool changed = true; changed;) {
     changed = false;
     for (auto& group : groups) group.clear();
     for (std::uint32_t s = 0; s < reached.size(); ++s) {
       if (reached[s] != 0) groups[sets.Find(s)].push_back(s);
     }
+    pulse(kOutcomeWork * reached.size());
     for (const auto& group : groups) {
-      if (!group.empty() && JoinSuccessors(pomdp, group, sets, reached, first)) changed = true;
-      if (!group.empty() && stop && stop()) return false;
+      if (!group.empty() && JoinSuccessors(pomdp, group, sets, reached, first, pulse)) changed = true;
     }
   }
-  return true;
 }
 
-}  // namespace
-
-double OutcomeBytes(const Pomdp& pomdp) {
-  double steps = 0.0;
-  for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
-    for (std::size_t s = 0; s < pomdp.state_count(); ++s) {
-      for (const SparseEntry& next : pomdp.transitions.Row(pomdp.At(a, s))) {
-        steps += static_cast<double>(pomdp.observation_rows.Row(pomdp.At(a, next.index)).size());
-      }
-    }
-  }
-  return steps * sizeof(ClassOutcome::Step);
-}
-
-std::optional<ObservableClasses> FindObservableClasses(const Pomdp& pomdp, const std::function<bool()>& stop) {
+ObservableClasses Find(const Pomdp& pomdp, Pulse& pulse) {
   const std::size_t count = pomdp.state_count();
   UnionFind sets(count);
   std::vector<std::uint32_t> root;
   for (const SparseEntry& s : pomdp.start) root.push_back(s.index);
   std::vector<std::vector<std::uint32_t>> groups(count);
-  if (!JoinAll(pomdp, root, sets, groups, stop)) return std::nullopt;
+  JoinAll(pomdp, root, sets, groups, pulse);
 
   ObservableClasses found;
   std::vector<std::uint32_t> class_of(count, kNone);
@@ -146,11 +136,33 @@ std::optional<ObservableClasses> FindObservableClasses(const Pomdp& pomdp, const
   }
   for (ObservableClasses::Class& c : found.classes) {
     for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
-      c.outcomes.push_back(Outcomes(pomdp, a, c.states, class_of, position));
-      if (stop && stop()) return std::nullopt;
+      c.outcomes.push_back(Outcomes(pomdp, a, c.states, class_of, position, pulse));
     }
   }
   return found;
+}
+
+}  // namespace
+
+double OutcomeBytes(const Pomdp& pomdp) {
+  double steps = 0.0;
+  for (std::size_t a = 0; a < pomdp.action_count(); ++a) {
+    for (std::size_t s = 0; s < pomdp.state_count(); ++s) {
+      for (const SparseEntry& next : pomdp.transitions.Row(pomdp.At(a, s))) {
+        steps += static_cast<double>(pomdp.observation_rows.Row(pomdp.At(a, next.index)).size());
+      }
+    }
+  }
+  return steps * sizeof(ClassOutcome::Step);
+}
+
+std::optional<ObservableClasses> FindObservableClasses(const Pomdp& pomdp, const std::function<bool()>& stop) {
+  Pulse pulse(stop);
+  try {
+    return Find(pomdp, pulse);
+  } catch (const Interrupted&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace feeler::planner

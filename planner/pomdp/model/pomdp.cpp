@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "feeler/core/error.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 namespace {
@@ -45,9 +46,11 @@ std::vector<std::uint8_t> AbsorbingStates(const Pomdp& pomdp) {
   return absorbing;
 }
 
-std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<bool()>& stop) {
+namespace {
+
+/// SurelyEnding, interrupted by `pulse`.
+std::vector<std::uint8_t> FindSurelyEnding(const Pomdp& pomdp, Pulse& pulse) {
   const std::size_t count = pomdp.state_count();
-  if (count == 0) return {};
   const std::size_t rows = pomdp.transitions.size();
   std::vector<std::size_t> begin(count + 1, 0);  // of the rows that lead to a state
   for (const SparseEntry& next : pomdp.transitions.entries) ++begin[next.index + 1];
@@ -61,8 +64,8 @@ std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<b
   // Keeps the states from which some action stays among the kept ones and may come nearer: the goal for certain.
   std::vector<std::uint8_t> kept(count, 1);
   std::vector<std::uint32_t> open;
+  std::vector<std::uint8_t> stays(rows, 1);  // rows that lead to kept states alone
   for (bool changed = true; changed;) {
-    if (stop && stop()) return std::vector<std::uint8_t>(count, 1);
     std::vector<std::uint8_t> near = ends;
     for (std::uint32_t s = 0; s < count; ++s) {
       if (near[s] != 0) open.push_back(s);
@@ -72,17 +75,32 @@ std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<b
       open.pop_back();
       for (std::size_t k = begin[to]; k < begin[to + 1]; ++k) {
         const auto s = static_cast<std::uint32_t>(leading[k] % count);
-        if (near[s] != 0 || kept[s] == 0) continue;
-        const auto row = pomdp.transitions.Row(leading[k]);
-        if (!std::ranges::all_of(row, [&](const SparseEntry& n) { return kept[n.index] != 0; })) continue;
+        if (near[s] != 0 || kept[s] == 0 || stays[leading[k]] == 0) continue;
         near[s] = 1;
         open.push_back(s);
       }
+      pulse(3 * (begin[to + 1] - begin[to]) + 10);
     }
     changed = near != kept;
+    for (std::size_t s = 0; s < count; ++s) {
+      if (near[s] != 0 || kept[s] == 0) continue;
+      for (std::size_t k = begin[s]; k < begin[s + 1]; ++k) stays[leading[k]] = 0;
+      pulse(begin[s + 1] - begin[s] + 1);
+    }
     kept = std::move(near);
   }
   return kept;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> SurelyEnding(const Pomdp& pomdp, const std::function<bool()>& stop) {
+  Pulse pulse(stop);
+  try {
+    return FindSurelyEnding(pomdp, pulse);
+  } catch (const Interrupted&) {
+    return std::vector<std::uint8_t>(pomdp.state_count(), 1);
+  }
 }
 
 std::vector<std::uint32_t> ReachableStates(const Pomdp& pomdp) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "feeler/planner/pomdp/model/belief_update.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 namespace {
@@ -52,7 +53,6 @@ SimulationResult SimulatePomdp(const Pomdp& pomdp, PomdpAgent& agent, const Simu
   double squares = 0.0;
   double steps = 0.0;
   for (int episode = 0; episode < options.episodes; ++episode) {
-    if (options.cancellation != nullptr && options.cancellation->cancelled()) break;
     if (options.progress && episode % 100 == 0) options.progress(episode, options.episodes);
     RandomStream random(options.seed, static_cast<std::uint64_t>(episode), "pomdp-episode");
     agent.Reset();
@@ -60,13 +60,19 @@ SimulationResult SimulatePomdp(const Pomdp& pomdp, PomdpAgent& agent, const Simu
     double sum = 0.0;
     double weight = 1.0;
     int step = 0;
-    for (; step < longest && absorbing[state] == 0; ++step) {
-      const std::uint32_t action = agent.Act();
-      sum += weight * pomdp.reward[pomdp.At(action, state)];
-      weight *= pomdp.discount;
-      state = Draw(pomdp.transitions.Row(pomdp.At(action, state)), random);
-      agent.Observe(action, Draw(pomdp.observation_rows.Row(pomdp.At(action, state)), random));
+    const auto cancelled = [&] { return options.cancellation != nullptr && options.cancellation->cancelled(); };
+    try {
+      for (; step < longest && absorbing[state] == 0 && !cancelled(); ++step) {
+        const std::uint32_t action = agent.Act();
+        sum += weight * pomdp.reward[pomdp.At(action, state)];
+        weight *= pomdp.discount;
+        state = Draw(pomdp.transitions.Row(pomdp.At(action, state)), random);
+        agent.Observe(action, Draw(pomdp.observation_rows.Row(pomdp.At(action, state)), random));
+      }
+    } catch (const Interrupted&) {
+      break;
     }
+    if (cancelled()) break;  // the episode in work is none
     result.at_goal += absorbing[state] != 0 ? 1 : 0;
     result.cut_short += absorbing[state] == 0 && cuts ? 1 : 0;
     ++result.episodes;

@@ -17,6 +17,7 @@ class PomdpAgent {
  public:
   virtual ~PomdpAgent() = default;
   virtual void Reset() = 0;
+  /// May throw Interrupted where it takes long and is to stop: that ends the simulation before this episode.
   virtual std::uint32_t Act() = 0;
   virtual void Observe(std::uint32_t action, std::uint32_t observation) = 0;
 };

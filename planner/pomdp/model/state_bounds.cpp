@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "feeler/planner/pomdp/model/goal_costs.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 namespace {
@@ -15,7 +16,8 @@ using Rows = std::vector<std::vector<double>>;
 
 class Sweeper {
  public:
-  Sweeper(const Pomdp& pomdp, const StateBoundsOptions& options) : pomdp_(pomdp), options_(options) {
+  Sweeper(const Pomdp& pomdp, const StateBoundsOptions& options)
+      : pomdp_(pomdp), options_(options), pulse_(options.stop) {
     for (const double r : pomdp.reward) {
       least_ = std::min(least_, r);
       most_ = std::max(most_, r);
@@ -50,20 +52,25 @@ class Sweeper {
  private:
   template <class Sweep>
   void Repeat(Sweep sweep) {
-    for (int i = 0; i < options_.sweeps; ++i) {
-      if (sweep() <= options_.precision * scale_) return;
-      if (options_.stop && options_.stop()) return;
+    try {
+      for (int i = 0; i < options_.sweeps; ++i) {
+        if (sweep() <= options_.precision * scale_) return;
+      }
+    } catch (const Interrupted&) {
+      // Every value is a bound at any time.
     }
   }
 
-  double Backup(std::size_t a, std::size_t s, const std::vector<double>& values) const {
+  double Backup(std::size_t a, std::size_t s, const std::vector<double>& values) {
     double sum = 0.0;
-    for (const SparseEntry& next : pomdp_.transitions.Row(pomdp_.At(a, s))) sum += next.value * values[next.index];
+    const std::span<const SparseEntry> row = pomdp_.transitions.Row(pomdp_.At(a, s));
+    pulse_(row.size() + 5);
+    for (const SparseEntry& next : row) sum += next.value * values[next.index];
     return pomdp_.reward[pomdp_.At(a, s)] + pomdp_.discount * sum;
   }
 
   /// In place (Gauss-Seidel): values only fall, and stay above V*.
-  double SweepMdp(std::vector<double>& best, Rows& q) const {
+  double SweepMdp(std::vector<double>& best, Rows& q) {
     double change = 0.0;
     for (std::size_t s = 0; s < best.size(); ++s) {
       double most = -kNoBound;
@@ -80,12 +87,12 @@ class Sweeper {
     std::vector<std::uint32_t> seen;
     sums_.assign(pomdp_.observation_count() * q.size(), 0.0);
     for (std::size_t s = 0; s < pomdp_.state_count(); ++s) {
-      if (options_.stop && options_.stop()) return kNoBound;  // a sweep may take long; the bounds hold
       for (std::size_t a = 0; a < q.size(); ++a) {
         seen.clear();
         for (const SparseEntry& next : pomdp_.transitions.Row(pomdp_.At(a, s))) {
           for (const SparseEntry& o : pomdp_.observation_rows.Row(pomdp_.At(a, next.index))) {
             double* sum = sums_.data() + o.index * q.size();
+            pulse_(q.size() + 5);
             seen.push_back(o.index);
             for (std::size_t then = 0; then < q.size(); ++then) sum[then] += next.value * o.value * q[then][next.index];
           }
@@ -106,7 +113,7 @@ class Sweeper {
     return change;
   }
 
-  double SweepBlind(std::size_t a, std::vector<double>& values) const {
+  double SweepBlind(std::size_t a, std::vector<double>& values) {
     double change = 0.0;
     for (std::size_t s = 0; s < values.size(); ++s) {
       const double value = std::max(values[s], Backup(a, s, values));
@@ -117,6 +124,7 @@ class Sweeper {
   }
 
   void BlindToGoal(std::size_t a, std::vector<double>& values) const {
+    if (options_.stop && options_.stop()) return;
     GoalChain chain;
     chain.goal = AbsorbingStates(pomdp_);
     for (std::size_t s = 0; s < values.size(); ++s) {
@@ -129,6 +137,7 @@ class Sweeper {
 
   const Pomdp& pomdp_;
   const StateBoundsOptions& options_;
+  Pulse pulse_;
   double least_ = 0.0, most_ = -kNoBound;
   double scale_ = 1.0;
   std::vector<double> sums_;

@@ -24,7 +24,7 @@ struct StateBounds {
 struct StateBoundsOptions {
   int sweeps = 1000;        ///< at most, of each
   double precision = 1e-7;  ///< stop where a sweep changes less, relative to the largest value
-  /// Asked after each sweep; true to stop early. May be empty.
+  /// Asked now and then; true to stop early. May be empty.
   std::function<bool()> stop = {};
 };
 

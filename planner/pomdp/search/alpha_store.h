@@ -31,6 +31,8 @@ class AlphaStore {
 
   /// Returns its number. Vectors that the new one dominates everywhere are dropped.
   std::uint32_t Add(AlphaVector vector);
+  /// Vectors that are new.
+  std::size_t Unseen(const Cursor& cursor) const { return active_.size() - (cursor.epoch == epoch_ ? cursor.seen : 0); }
   /// Looks at what is new; returns the value of the best vector met, -infinity if nothing is new.
   double Advance(std::span<const SparseEntry> belief, Cursor& cursor) const;
   const AlphaVector& operator[](std::uint32_t number) const { return vectors_[number]; }

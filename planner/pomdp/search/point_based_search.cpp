@@ -79,6 +79,7 @@ std::uint32_t PointBasedSearch::Intern(std::uint32_t class_index, std::vector<Sp
 }
 
 void PointBasedSearch::Refresh(std::uint32_t class_index, std::span<const SparseEntry> belief, Bound& bound) {
+  pulse_(belief.size() * alphas_[class_index].Unseen(bound.alphas) + 10 * uppers_[class_index].Unseen(bound.points));
   bound.lower = std::max(bound.lower, alphas_[class_index].Advance(belief, bound.alphas));
   for (const SparseEntry& s : belief) dense_[s.index] = s.value;
   bound.upper = std::min(bound.upper, uppers_[class_index].Advance(belief, dense_.data(), bound.upper, bound.points));
@@ -86,6 +87,7 @@ void PointBasedSearch::Refresh(std::uint32_t class_index, std::span<const Sparse
 }
 
 void PointBasedSearch::Successor(const Node& node, const ClassOutcome& outcome) {
+  pulse_(2 * outcome.steps.size() + classes_.classes[outcome.next].states.size());
   for (const SparseEntry& s : node.belief) dense_[s.index] = s.value;
   double sum = 0.0;
   for (const ClassOutcome::Step& step : outcome.steps) {
@@ -116,6 +118,7 @@ void PointBasedSearch::Expand(std::uint32_t number) {
     node.reward.push_back(reward);
     for (std::uint32_t o = 0; o < c.outcomes[a].size(); ++o) {
       double probability = 0.0;
+      pulse_(c.outcomes[a][o].steps.size());
       for (const ClassOutcome::Step& step : c.outcomes[a][o].steps) probability += dense_[step.from] * step.probability;
       if (probability > kImpossible) node.children.push_back({probability, o, kNone, {}});
     }
@@ -213,6 +216,7 @@ void PointBasedSearch::AddAlpha(std::uint32_t number, std::size_t action) {
     const AlphaStore& store = alphas_[outcomes[o].next];
     if (vector.next[o] == kNone) vector.next[o] = store.fallback();
     const std::vector<double>& next = store[vector.next[o]].values;
+    pulse_(outcomes[o].steps.size());
     for (const ClassOutcome::Step& step : outcomes[o].steps) values[step.from] += step.probability * next[step.to];
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -253,6 +257,18 @@ std::uint32_t PointBasedSearch::WidestSuccessor(std::uint32_t number, std::size_
 
 std::optional<SolverStatus> PointBasedSearch::Run(
     double precision, const std::function<std::optional<SolverStatus>(std::int64_t)>& stop) {
+  std::optional<SolverStatus> why;
+  pulse_ = Pulse([&] { return (why = stop(expansions_)).has_value(); });
+  try {
+    why = RunTrials(precision, stop);
+  } catch (const Interrupted&) {
+  }
+  pulse_ = Pulse();
+  return why;
+}
+
+std::optional<SolverStatus> PointBasedSearch::RunTrials(
+    double precision, const std::function<std::optional<SolverStatus>(std::int64_t)>& stop) {
   // Where rewards are large, what matters may be less than a usual part of them.
   least_change_ = scale_ * std::clamp(1e-2 * precision / scale_, 1e-14, 1e-10);
   std::vector<std::uint32_t> trial;
@@ -284,7 +300,7 @@ std::optional<SolverStatus> PointBasedSearch::Run(
 
 void PointBasedSearch::Prune() {
   for (std::size_t c = 0; c < classes_.classes.size(); ++c) {
-    if (uppers_[c].Crowded()) uppers_[c].Rebase(dense_);
+    if (uppers_[c].Crowded()) uppers_[c].Rebase(dense_, pulse_);
     if (!alphas_[c].Crowded()) continue;
     std::vector<std::uint8_t> marked(alphas_[c].size(), 0);
     for (Node& node : nodes_) {

@@ -13,6 +13,7 @@
 #include "feeler/planner/pomdp/model/controller.h"
 #include "feeler/planner/pomdp/model/observable_classes.h"
 #include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 #include "feeler/planner/pomdp/model/state_bounds.h"
 #include "feeler/planner/pomdp/search/alpha_store.h"
 #include "feeler/planner/pomdp/search/sawtooth.h"
@@ -41,8 +42,9 @@ class PointBasedSearch {
   /// Everything must outlive the search. The discount must be below 1.
   PointBasedSearch(const Pomdp& pomdp, const ObservableClasses& classes, const StateBounds& bounds);
 
-  /// Until U - L <= precision at the start, or `stop(expansions)` says why not to go on. kRounding: trials change
-  /// nothing any more.
+  /// Until U - L <= precision at the start, or `stop(expansions)` says why not to go on (it is asked within updates,
+  /// too: those of large models take long; once it has stopped the search is over). kRounding: trials change nothing
+  /// any more.
   std::optional<SolverStatus> Run(double precision,
                                   const std::function<std::optional<SolverStatus>(std::int64_t)>& stop);
 
@@ -82,6 +84,8 @@ class PointBasedSearch {
     std::vector<double> reward;  ///< by action
   };
 
+  std::optional<SolverStatus> RunTrials(double precision,
+                                        const std::function<std::optional<SolverStatus>(std::int64_t)>& stop);
   std::uint32_t Intern(std::uint32_t class_index, std::vector<SparseEntry> belief);
   void Expand(std::uint32_t node);
   Bound& BoundOf(Child& child) { return child.node == kNone ? child.bound : nodes_[child.node].bound; }
@@ -98,6 +102,7 @@ class PointBasedSearch {
   std::uint32_t WidestSuccessor(std::uint32_t node, std::size_t action, double width);
   void Prune();
 
+  Pulse pulse_;
   const Pomdp& pomdp_;
   const ObservableClasses& classes_;
   std::vector<AlphaStore> alphas_;  ///< by class

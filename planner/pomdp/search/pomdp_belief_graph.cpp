@@ -1,6 +1,7 @@
 #include "feeler/planner/pomdp/search/pomdp_belief_graph.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace feeler::planner {
@@ -34,9 +35,10 @@ void PomdpBeliefGraph::FindTwins() {
     std::uint64_t hash = 0x9E3779B97F4A7C15;
     for (std::size_t a = 0; a < pomdp_.action_count(); ++a) {
       for (const SparseEntry& e : pomdp_.transitions.Row(pomdp_.At(a, s))) {
-        hash = (hash ^ e.index) * 0xFF51AFD7ED558CCD;
+        hash = (hash ^ e.index ^ std::bit_cast<std::uint64_t>(e.value)) * 0xFF51AFD7ED558CCD;
         hash ^= hash >> 31;
       }
+      hash ^= std::bit_cast<std::uint64_t>(pomdp_.reward[pomdp_.At(a, s)] + 0.0);
     }
     std::uint32_t twin = s;
     const auto [begin, end] = first.equal_range(hash);
@@ -122,6 +124,7 @@ std::uint32_t PomdpBeliefGraph::Intern(std::vector<SparseEntry> belief) {
   if (!twin_.empty()) belief = Merged(belief);
   const std::uint32_t known = FindMerged(belief);
   if (known != kNone) return known;
+  pulse_(belief.size() * pomdp_.action_count());
   const auto number = static_cast<std::uint32_t>(beliefs_.size());
   index_.emplace(HashOf(belief), number);
   bytes_ += sizeof(Node) + 64 + belief.size() * sizeof(SparseEntry);
@@ -154,7 +157,7 @@ void PomdpBeliefGraph::RepeatUntilChanged(std::uint32_t b, double to_goal, Actio
 void PomdpBeliefGraph::Expand(std::uint32_t b) {
   const std::vector<SparseEntry> belief = beliefs_[b].states;  // Intern may move the beliefs
   const auto first_action = static_cast<std::uint32_t>(actions_.size());
-  BeliefUpdate update(pomdp_);
+  BeliefUpdate update(pomdp_, &pulse_);
   for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
     Action action{CostOf(belief, a), a, static_cast<std::uint32_t>(successors_.size()), 0};
     bool changes = false;

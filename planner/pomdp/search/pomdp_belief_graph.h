@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <unordered_map>
@@ -8,6 +9,7 @@
 
 #include "feeler/planner/pomdp/model/belief_update.h"
 #include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 #include "feeler/planner/pomdp/model/state_bounds.h"
 
 namespace feeler::planner {
@@ -48,6 +50,10 @@ class PomdpBeliefGraph {
   };
 
   PomdpBeliefGraph(const Pomdp& pomdp, const StateBounds& bounds, int levels);
+
+  /// Where `stop` (asked now and then) says so, Actions throws Interrupted: one belief may take long. The belief is
+  /// then left unexpanded.
+  void SetStop(std::function<bool()> stop) { pulse_ = Pulse(std::move(stop)); }
 
   /// The start belief; a goal if Trivial().
   std::uint32_t Start() const { return 0; }
@@ -115,6 +121,7 @@ class PomdpBeliefGraph {
   const Pomdp& pomdp_;
   const StateBounds& bounds_;
   int levels_;
+  Pulse pulse_;
   std::vector<std::uint8_t> absorbing_;
   std::vector<std::uint32_t> twin_;  ///< empty: each its own
   double constant_ = 0.0;            ///< C

@@ -6,10 +6,10 @@
 namespace feeler::planner {
 
 PomdpExperience::PomdpExperience(PomdpBeliefGraph& graph, const PomdpController& policy, double epsilon,
-                                 std::size_t limit)
+                                 std::size_t limit, const std::function<bool()>& stop)
     : graph_(graph), epsilon_(epsilon) {
   RollOut(policy, limit);
-  Sweep();
+  Sweep(Pulse(stop));
 }
 
 void PomdpExperience::RollOut(const PomdpController& policy, std::size_t limit) {
@@ -41,12 +41,13 @@ void PomdpExperience::RollOut(const PomdpController& policy, std::size_t limit) 
 
 /// Equation 6: the least of jumping to the goal, and of following the experience; jumps between beliefs of B^E are left
 /// to operator().
-void PomdpExperience::Sweep() {
+void PomdpExperience::Sweep(Pulse pulse) {
   for (int sweep = 0; sweep < 1000; ++sweep) {
     double change = 0.0;
     for (std::size_t i = entries_.size(); i-- > 0;) {
       Entry& entry = entries_[i];
       if (!entry.followed) continue;
+      pulse(5 * entry.branches.size() + 10);
       double value = entry.cost;
       for (const auto& [next, share] : entry.branches) value += share * entries_[next].value;
       value = std::min(value, epsilon_ * graph_.Heuristic(entry.belief));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <unordered_map>
 #include <vector>
 
@@ -16,8 +17,10 @@ namespace feeler::planner {
 /// same states, else it is impossible; so heur(b) <= heur(b, b') + heur(b'), and the triangle inequality holds.
 class PomdpExperience {
  public:
-  /// Rolls out at most `limit` beliefs; `graph` grows by them.
-  PomdpExperience(PomdpBeliefGraph& graph, const PomdpController& policy, double epsilon, std::size_t limit);
+  /// Rolls out at most `limit` beliefs; `graph` grows by them. Throws Interrupted where `stop` (asked now and then, may
+  /// be empty) or that of the graph says so.
+  PomdpExperience(PomdpBeliefGraph& graph, const PomdpController& policy, double epsilon, std::size_t limit,
+                  const std::function<bool()>& stop = {});
 
   /// At most epsilon * heur(b).
   double operator()(std::uint32_t b) const;
@@ -33,7 +36,7 @@ class PomdpExperience {
     double value = 0.0;
   };
   void RollOut(const PomdpController& policy, std::size_t limit);
-  void Sweep();
+  void Sweep(Pulse pulse);
   std::uint64_t StatesOf(std::uint32_t b) const;
 
   PomdpBeliefGraph& graph_;

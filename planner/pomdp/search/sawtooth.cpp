@@ -66,7 +66,7 @@ void Sawtooth::Add(std::uint32_t owner, std::span<const SparseEntry> belief, dou
   points_.push_back(std::move(point));
 }
 
-void Sawtooth::Rebase(std::vector<double>& dense) {
+void Sawtooth::Rebase(std::vector<double>& dense, Pulse& pulse) {
   corners_ = better_corners_;
   for (Point& point : points_) {
     point.gain = point.upper - AtCorners(point);
@@ -75,6 +75,7 @@ void Sawtooth::Rebase(std::vector<double>& dense) {
   // Newer points are better: an older one goes where they imply it.
   for (Point& point : points_) {
     if (point.dropped) continue;
+    pulse(10 * points_.size());
     for (const Entry& e : point.entries) dense[e.index] = 1.0 / e.inverse;
     const double at_corners = point.upper - point.gain;
     for (const Point& other : points_) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "feeler/planner/pomdp/model/pomdp.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 
 namespace feeler::planner {
 
@@ -21,6 +22,8 @@ class Sawtooth {
   /// `rows`: vectors over the states of the class whose maximum is an upper bound.
   explicit Sawtooth(std::vector<std::vector<double>> rows);
 
+  /// Points that are new.
+  std::size_t Unseen(const Cursor& cursor) const { return points_.size() - (cursor.epoch == epoch_ ? cursor.seen : 0); }
   /// The least bound met in what is new; infinity if nothing is. `dense` is the belief as a vector over the class. Work
   /// stops as soon as a point cannot beat `known`.
   double Advance(std::span<const SparseEntry> belief, const double* dense, double known, Cursor& cursor) const;
@@ -30,8 +33,8 @@ class Sawtooth {
 
   bool Crowded() const { return points_.size() > 2 * kept_ + 100; }
   /// Takes the corners into account, and drops points that the others imply. `dense` is scratch of the size of the
-  /// class, zero before and after.
-  void Rebase(std::vector<double>& dense);
+  /// class, zero before and after. Interrupted, the store is of no use any more.
+  void Rebase(std::vector<double>& dense, Pulse& pulse);
   std::size_t size() const { return points_.size(); }
   std::size_t bytes() const { return bytes_; }
 

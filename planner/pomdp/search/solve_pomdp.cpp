@@ -10,6 +10,7 @@
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/model/observable_classes.h"
+#include "feeler/planner/pomdp/model/pulse.h"
 #include "feeler/planner/pomdp/search/point_based_search.h"
 #include "feeler/planner/pomdp/search/pomdp_belief_graph.h"
 #include "feeler/planner/pomdp/search/pomdp_experience.h"
@@ -25,6 +26,9 @@ constexpr std::size_t kEvaluatedUnknowns = 400'000;
 /// Beliefs of a controller written out of a search, at most.
 constexpr std::size_t kControllerNodes = 5'000;
 constexpr std::size_t kExperienceBeliefs = 50'000;
+/// What comes before the search may be late by so much (one that may not begin at all is of little use), and each of
+/// the two steps after it: writing the policy out, and evaluating it.
+constexpr double kGrace_s = 0.5;
 
 /// The policies that always do the same, as an incumbent of BoundedSearch (which see for the interface).
 class BlindIncumbent {
@@ -48,6 +52,7 @@ class BlindIncumbent {
     return best;
   }
   std::int64_t expansions() const { return 0; }
+  std::size_t bytes() const { return values_.capacity() * sizeof(double); }
 
  private:
   static constexpr double kUnknown = -kUnbounded;
@@ -71,6 +76,7 @@ class Attempt {
   PomdpResult Run() {
     RequireReachableGoal();
     bounds_ = ComputeStateBounds(pomdp_, {.stop = [this] { return Stop(0).has_value(); }});
+    bytes_ = pomdp_.bytes() + 3 * pomdp_.reward.size() * sizeof(double);
     result_.value_upper = BestRow(bounds_.informed, pomdp_.start);
     result_.value_lower = BestRow(bounds_.blind, pomdp_.start);
     KeepBlind();
@@ -92,18 +98,23 @@ class Attempt {
  private:
   double Wall() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
 
-  std::optional<SolverStatus> Stop(std::int64_t expansions) const {
+  bool Cancelled() {
+    const bool cancelled = options_.cancellation != nullptr && options_.cancellation->cancelled();
+    if (cancelled && cancelled_at_s_ < 0.0) cancelled_at_s_ = Wall();
+    return cancelled;
+  }
+
+  std::optional<SolverStatus> Stop(std::int64_t expansions) {
     if (expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
-    if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
+    if (Cancelled()) return SolverStatus::kCancelled;
     if (Wall() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
     return std::nullopt;
   }
 
-  /// Stop() of what comes before the search: a search that may not begin at all is of less use than one that is late by
-  /// a little.
-  bool Late() const {
+  /// Stop() of what comes before the search.
+  bool Late() {
     const auto why = Stop(0);
-    return why && (why != SolverStatus::kTimeLimit || Wall() >= options_.time_limit_s + 2.0);
+    return why && (why != SolverStatus::kTimeLimit || Wall() >= options_.time_limit_s + kGrace_s);
   }
 
   void Row(bool now) {
@@ -115,7 +126,7 @@ class Attempt {
   }
 
   /// Without discount: from each state some way must lead to a goal, or no policy has a finite value.
-  void RequireReachableGoal() const {
+  void RequireReachableGoal() {
     if (pomdp_.discount < 1.0) return;
     const std::vector<std::uint8_t> kept = SurelyEnding(pomdp_, [this] { return Stop(0).has_value(); });
     for (const SparseEntry& s : pomdp_.start) {
@@ -135,9 +146,11 @@ class Attempt {
   }
 
   void PointBased() {
-    if (OutcomeBytes(pomdp_) > static_cast<double>(options_.memory_limit_bytes)) {
+    const double outcome_bytes = OutcomeBytes(pomdp_);
+    if (static_cast<double>(bytes_) + outcome_bytes > static_cast<double>(options_.memory_limit_bytes)) {
       return BlindAlone(SolverStatus::kMemoryLimit);
     }
+    bytes_ += static_cast<std::size_t>(outcome_bytes);
     const auto found = FindObservableClasses(pomdp_, [this] { return Late(); });
     if (!found) return BlindAlone(Stop(0).value_or(SolverStatus::kTimeLimit));
     const ObservableClasses& classes = *found;
@@ -152,7 +165,7 @@ class Attempt {
     const auto why = search.Run(options_.precision, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       account();
       Row(false);
-      if (search.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      if (OutOfMemory(search.bytes())) return SolverStatus::kMemoryLimit;
       return Stop(expansions);
     });
     account();
@@ -191,19 +204,39 @@ class Attempt {
   /// Takes a controller if it is worth more than the one that is kept.
   void Offer(const PomdpController& controller) {
     const double give_up_s = GiveUp();
-    const auto value = EvaluateController(pomdp_, controller, [&] { return Wall() > give_up_s; });
+    const auto value = EvaluateController(pomdp_, controller, [&] { return GivenUp(give_up_s); });
     if (!value || value->value <= worth_) return;
     Keep(controller, value->value);
     result_.value_lower = std::max(result_.value_lower, worth_);
   }
 
-  double GiveUp() const { return Wall() + std::max(2.0, 0.1 * Wall()); }
+  /// When a step of what follows a search is cut short.
+  double GiveUp() {
+    if (Cancelled()) return Wall() + kGrace_s;
+    return std::min(std::max(Wall(), options_.time_limit_s) + kGrace_s, Wall() + std::max(2.0, 0.1 * Wall()));
+  }
+  bool GivenUp(double give_up_s) {
+    return Wall() > give_up_s || (Cancelled() && Wall() > cancelled_at_s_ + 2.0 * kGrace_s);
+  }
 
   /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
   /// on blindly, as it does where it is cut short for being too large. Nothing where that would not reach a goal.
   template <class ActionOf>
   std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of) {
     const double give_up_s = GiveUp();
+    graph.SetStop([this, give_up_s] { return GivenUp(give_up_s); });
+    std::optional<PomdpController> controller = FreezeUntil(graph, action_of, give_up_s);
+    StopWithSearch(graph);
+    return controller;
+  }
+
+  /// A belief may take long to expand: there the search looks at its limits, too.
+  void StopWithSearch(PomdpBeliefGraph& graph) {
+    graph.SetStop([this] { return Stop(0).has_value(); });
+  }
+
+  template <class ActionOf>
+  std::optional<PomdpController> FreezeUntil(PomdpBeliefGraph& graph, ActionOf action_of, double give_up_s) {
     BlindIncumbent blind(graph, bounds_);
     PomdpController controller;
     std::map<std::uint32_t, std::uint32_t> number;
@@ -215,8 +248,13 @@ class Attempt {
     };
     of(graph.Start());
     for (std::size_t i = 0; i < beliefs.size(); ++i) {
-      frozen_cut_ = beliefs.size() > kControllerNodes || Wall() > give_up_s;
-      const int index = frozen_cut_ ? -1 : action_of(beliefs[i]);
+      frozen_cut_ = beliefs.size() > kControllerNodes || GivenUp(give_up_s);
+      int index = -1;
+      try {
+        if (!frozen_cut_) index = action_of(beliefs[i]);
+      } catch (const Interrupted&) {
+        frozen_cut_ = true;
+      }
       PomdpController::Node node{0, {}, static_cast<std::uint32_t>(i)};
       if (index < 0) {
         if (!blind.Solved(beliefs[i])) return std::nullopt;
@@ -233,6 +271,19 @@ class Attempt {
     }
     return controller;
   }
+
+  template <class Search, class SearchStop>
+  std::optional<SolverStatus> RunSearch(PomdpBeliefGraph& graph, Search& search, SearchStop stop) {
+    StopWithSearch(graph);
+    try {
+      return search.Run(graph.Start(), stop);
+    } catch (const Interrupted&) {
+      return Stop(0).value_or(SolverStatus::kTimeLimit);
+    }
+  }
+
+  /// The model and its bounds count, too.
+  bool OutOfMemory(std::size_t search_bytes) const { return bytes_ + search_bytes > options_.memory_limit_bytes; }
 
   /// Initial beliefs that are goals already.
   bool Trivial(const PomdpBeliefGraph& graph) {
@@ -256,7 +307,7 @@ class Attempt {
       result_.value_upper =
           std::min(result_.value_upper, graph.to_goal() - graph.start_share() * search.Lower(graph.Start()));
     };
-    const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+    const auto why = RunSearch(graph, search, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       account(expansions);
       if (pomdp_.discount == 1.0 && search.trials() >= next_offer_) {
         next_offer_ = 2 * search.trials();
@@ -264,7 +315,7 @@ class Attempt {
       }
       Row(false);
       if (result_.value_upper - result_.value_lower <= options_.precision) return SolverStatus::kConverged;
-      if (graph.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      if (OutOfMemory(graph.bytes() + search.bytes() + incumbent.bytes())) return SolverStatus::kMemoryLimit;
       return Stop(expansions);
     });
     account(search.expansions());
@@ -294,8 +345,16 @@ class Attempt {
     PomdpBeliefGraph graph(pomdp_, bounds_, options_.levels);
     if (Trivial(graph)) return;
     if (options_.kind == PomdpSolverKind::kERtdpBel && options_.experience != nullptr) {
-      const PomdpExperience experience(graph, *options_.experience, options_.epsilon, kExperienceBeliefs);
-      return RunRtdp(graph, [&](std::uint32_t b) { return experience(b); });
+      StopWithSearch(graph);
+      std::optional<PomdpExperience> experience;
+      try {
+        experience.emplace(graph, *options_.experience, options_.epsilon, kExperienceBeliefs,
+                           [this] { return Stop(0).has_value(); });
+      } catch (const Interrupted&) {
+        result_.status = Stop(0).value_or(SolverStatus::kTimeLimit);
+        return;
+      }
+      return RunRtdp(graph, [&](std::uint32_t b) { return (*experience)(b); });
     }
     RunRtdp(graph, [&](std::uint32_t b) { return options_.epsilon * graph.Heuristic(b); });
   }
@@ -303,11 +362,11 @@ class Attempt {
   template <class Initial>
   void RunRtdp(PomdpBeliefGraph& graph, Initial initial) {
     RtdpBel search(graph, initial, options_.seed);
-    const auto why = search.Run(graph.Start(), [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+    const auto why = RunSearch(graph, search, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       result_.trials = search.trials();
       result_.expansions = expansions;
       Row(false);
-      if (graph.bytes() > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
+      if (OutOfMemory(graph.bytes() + search.bytes())) return SolverStatus::kMemoryLimit;
       return Stop(expansions);
     });
     result_.status = why.value_or(SolverStatus::kConverged);
@@ -351,7 +410,8 @@ class Attempt {
                           std::span<const SparseEntry> belief) {
     std::uint32_t best = 0;
     double least = kUnbounded;
-    BeliefUpdate update(pomdp_);
+    Pulse pulse([this] { return Cancelled(); });
+    BeliefUpdate update(pomdp_, &pulse);
     for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
       double cost = graph.CostOf(belief, a);
       update(belief, a, [&](std::uint32_t, double probability, const std::vector<SparseEntry>& next) {
@@ -383,6 +443,8 @@ class Attempt {
   double worth_ = -kUnbounded;  ///< of result_.controller, at least
   bool frozen_cut_ = false;     ///< the last controller out of Freeze goes on blindly for being too large
   std::int64_t next_offer_ = 1;
+  std::size_t bytes_ = 0;         ///< of what is there before the search
+  double cancelled_at_s_ = -1.0;  ///< when that was seen first; negative: not cancelled
   double next_row_s_ = 0.0;
 };
 

@@ -392,18 +392,6 @@ TEST(SolvePomdp, LargeRewardsEndTheSearch) {
   }
 }
 
-TEST(SolvePomdp, StopsAreAskedWithinASweep) {
-  const Pomdp pomdp = MakeRockSample(DrawRockSample(3, 3, 4));
-  std::size_t asked = 0;
-  StateBoundsOptions options;
-  options.sweeps = 1;
-  options.stop = [&] { return ++asked, false; };
-  const double whole = BestRow(ComputeStateBounds(pomdp, options).informed, pomdp.start);
-  EXPECT_GE(asked, pomdp.state_count());
-  options.stop = [] { return true; };
-  EXPECT_GE(BestRow(ComputeStateBounds(pomdp, options).informed, pomdp.start), whole);
-}
-
 TEST(SolvePomdp, LongChainsToAGoal) {
   constexpr int kLength = 20000;
   std::string text = "discount: 1\nvalues: cost\nstates: " + std::to_string(kLength) +
