@@ -77,6 +77,11 @@ void ConfirmedPolicy::Run(const Stop& stop) {
   Settle();
 }
 
+std::size_t ConfirmedPolicy::bytes() const {
+  return sure_.bytes() + greedy_.bytes() + value_.capacity() * sizeof(double) + move_.capacity() * sizeof(GuardedMove) +
+         order_.capacity() * sizeof(Step) + branches_.capacity() * sizeof(NoisyBeliefGraph::Successor);
+}
+
 /// From above: each value is the cost of a policy at all times, ending where that is cheaper.
 void ConfirmedPolicy::Settle() {
   constexpr int kSweeps = 1000;

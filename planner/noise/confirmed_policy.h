@@ -30,9 +30,12 @@ class ConfirmedPolicy {
   bool Solved(std::uint32_t /*b*/) const { return true; }
   double Value(std::uint32_t b) const { return b < value_.size() && value_[b] >= 0.0 ? value_[b] : graph_.EndCost(b); }
   int Action(std::uint32_t /*b*/) const { return 0; }  ///< to be asked for by Move
+  /// The move at any belief, worked out or not; cells = 0: ends.
+  GuardedMove Choose(std::uint32_t b, const Stop& stop);
   /// cells = 0: ends.
   GuardedMove Move(std::uint32_t b) const { return b < move_.size() ? move_[b] : GuardedMove{Direction::kPlusX, 0}; }
   std::int64_t expansions() const { return static_cast<std::int64_t>(order_.size()); }
+  std::size_t bytes() const;
 
  private:
   struct Step {
@@ -40,7 +43,6 @@ class ConfirmedPolicy {
     double cost = 0.0;
     std::size_t first = 0, count = 0;  ///< of branches_
   };
-  GuardedMove Choose(std::uint32_t b, const Stop& stop);
   void Settle();
 
   NoisyBeliefGraph& graph_;

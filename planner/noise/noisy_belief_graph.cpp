@@ -60,13 +60,12 @@ void NoisyBeliefGraph::SetEnd(Node& node) const {
   const std::span<const WeightedHypothesis> belief{entries_.data() + node.first, node.count};
   for (const WeightedHypothesis& h : belief) dense_[h.hypothesis] = h.weight;
   node.confidence = -1.0;
-  std::int32_t best = -1;
   const auto consider = [&](std::size_t set) {
     double probability = 0.0;
     for (const int h : goal_sets_[set]) probability += dense_[static_cast<std::size_t>(h)];
     if (probability <= node.confidence) return;
     node.confidence = probability;
-    best = static_cast<std::int32_t>(set);
+    node.likeliest = static_cast<std::int32_t>(set);
   };
   if (noisy_.problem.goal == GoalKind::kSingleton) {
     for (const WeightedHypothesis& h : belief) consider(h.hypothesis);
@@ -74,9 +73,8 @@ void NoisyBeliefGraph::SetEnd(Node& node) const {
     for (std::size_t set = 0; set < goal_sets_.size(); ++set) consider(set);
   }
   for (const WeightedHypothesis& h : belief) dense_[h.hypothesis] = 0.0;
-  const bool enough = node.confidence >= noisy_.declaration.confidence - 1e-12;
-  node.declared = enough ? best : -1;
-  node.end_cost = noisy_.WrongCost() * (enough ? std::max(0.0, 1.0 - node.confidence) : 1.0);
+  node.sure = node.confidence >= noisy_.declaration.confidence - 1e-12;
+  node.end_cost = noisy_.WrongCost() * (node.sure ? std::max(0.0, 1.0 - node.confidence) : 1.0);
 }
 
 std::uint32_t NoisyBeliefGraph::Intern(const Cell& robot, std::vector<WeightedHypothesis>& belief, double total) {
@@ -99,6 +97,18 @@ std::uint32_t NoisyBeliefGraph::Intern(const Cell& robot, std::vector<WeightedHy
   beliefs_.push_back(node);
   index_.emplace(hash, number);
   return number;
+}
+
+std::uint32_t NoisyBeliefGraph::Core(std::uint32_t b, double least) {
+  std::vector<WeightedHypothesis> core;
+  double total = 0.0;
+  for (const WeightedHypothesis& h : Belief(b)) {
+    if (h.weight < least) continue;
+    core.push_back(h);
+    total += h.weight;
+  }
+  if (core.empty() || core.size() == beliefs_[b].count) return b;
+  return Intern(beliefs_[b].robot, core, total);
 }
 
 void NoisyBeliefGraph::LookAhead(std::uint32_t b, Direction direction, int longest) {

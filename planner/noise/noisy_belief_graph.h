@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -71,11 +72,19 @@ class NoisyBeliefGraph {
   std::span<const WeightedHypothesis> Belief(std::uint32_t b) const {
     return {entries_.data() + beliefs_[b].first, beliefs_[b].count};
   }
+  /// The belief without hypotheses less likely than `least`, at the same cell.
+  std::uint32_t Core(std::uint32_t b, double least);
+  /// A better lower bound of a belief.
+  void RaiseHeuristic(std::uint32_t b, double bound) {
+    beliefs_[b].heuristic = std::min(beliefs_[b].end_cost, std::max(beliefs_[b].heuristic, bound));
+  }
   /// Cost of ending here.
   double EndCost(std::uint32_t b) const { return beliefs_[b].end_cost; }
   /// What is declared at the end: an index into goal_sets(); -1 where it is given up.
-  int Declared(std::uint32_t b) const { return beliefs_[b].declared; }
-  /// Probability that the declared set is right.
+  int Declared(std::uint32_t b) const { return beliefs_[b].sure ? beliefs_[b].likeliest : -1; }
+  /// The most probable goal set, whether it may be declared or not.
+  int Likeliest(std::uint32_t b) const { return beliefs_[b].likeliest; }
+  /// Probability of that set.
   double Confidence(std::uint32_t b) const { return beliefs_[b].confidence; }
   const std::vector<std::vector<int>>& goal_sets() const { return goal_sets_; }
 
@@ -91,7 +100,8 @@ class NoisyBeliefGraph {
     std::uint32_t count = 0;
     std::uint32_t first_action = kUnexpanded;
     std::uint32_t action_count = 0;
-    std::int32_t declared = -1;
+    std::int32_t likeliest = 0;
+    bool sure = false;  ///< so probable that it may be declared
     double heuristic = 0.0;
     double end_cost = 0.0;
     double confidence = 0.0;

@@ -96,7 +96,7 @@ void Settle(const NoisyPolicy& policy, const std::vector<double>& at, double sca
 }  // namespace
 
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
-                              double least_reach, NoisyEvaluation* evaluation) {
+                              double least_reach, NoisyEvaluation* evaluation, std::vector<std::uint32_t>* beliefs) {
   NoisyPolicy policy;
   std::vector<Place> places;
   Collect(graph, move_of, least_reach, policy, places);
@@ -106,6 +106,7 @@ NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<Guard
   for (std::size_t n = 0; n < count; ++n) at[n] = places[n].cost;
   Settle(policy, at, wrong_cost, {}, 0.0, cost);
   for (std::size_t n = 0; n < count; ++n) policy.nodes[n].expected_cost = cost[n];
+  for (std::size_t n = 0; beliefs != nullptr && n < count; ++n) beliefs->push_back(places[n].belief);
   if (evaluation == nullptr) return policy;
   const auto of = [&](const std::function<double(const NoisyPolicy::Node&)>& value) {
     std::vector<double> x(count, 0.0);

@@ -39,9 +39,10 @@ struct NoisyEvaluation {
 };
 
 /// The policy that makes the move `move_of(b)` at every belief it reaches from the start (cells = 0: ends). Beliefs
-/// reached with less than `least_reach` end. Costs to go are worked out from above, so that they are never too small.
+/// reached with less than `least_reach` end. `beliefs` (may be null): of each node.
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
-                              double least_reach, NoisyEvaluation* evaluation);
+                              double least_reach, NoisyEvaluation* evaluation,
+                              std::vector<std::uint32_t>* beliefs = nullptr);
 
 /// How often a move whose outcome leaves a belief as it is with probability `stays` is made again before that counts as
 /// giving up: so often that it happens with less than 1e-18.
