@@ -10,7 +10,7 @@ namespace {
 
 /// Trials close this share of the gap at the start, so that early ones stay short.
 constexpr double kTrialShare = 0.9;
-constexpr std::size_t kLongestTrial = 1000;
+constexpr std::size_t kLongestTrial = 200;
 /// Improvements below this share of the cost of being wrong are left out.
 constexpr double kLeastChange = 1e-8;
 /// The rest of a belief beside a point is bounded where the point alone gives this share of what is known.

@@ -26,6 +26,7 @@ constexpr double kMerged = 1e-7;
 constexpr std::size_t kFewHypotheses = 64;
 constexpr std::int64_t kBeforeSharing = 3000;
 constexpr double kSharedShare = 0.5;
+constexpr std::uint32_t kRaisedBeforeStop = 16;
 /// The ends of a policy have a probability of 1 in all, up to this, which is rounding.
 constexpr double kEnds = 1e-8;
 
@@ -201,6 +202,8 @@ class NoisyRun {
         FreezeShared();
         if (Closed()) return SolverStatus::kGap;
       }
+      // A trial is many updates: the clock is read after each.
+      if (watch_.wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
       return Stop(result_.expansions, incumbent_.bytes());
     });
     account();
@@ -216,8 +219,11 @@ class NoisyRun {
       why = Share();
       if (!why && !Closed()) {
         sharing_over_ = true;
-        for (std::uint32_t b = 0; b < graph_.size(); ++b) graph_.RaiseHeuristic(b, shared_->Lower(b));
-        why = CloseGap(std::numeric_limits<std::int64_t>::max());
+        for (std::uint32_t b = 0; b < graph_.size() && !why; ++b) {
+          graph_.RaiseHeuristic(b, shared_->Lower(b));
+          if (b % kRaisedBeforeStop == 0) why = Stop(result_.expansions, incumbent_.bytes());
+        }
+        if (!why) why = CloseGap(std::numeric_limits<std::int64_t>::max());
       }
     }
     result_.status = why.value_or(SolverStatus::kGap);
