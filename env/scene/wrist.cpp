@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "feeler/core/error.h"
-#include "feeler/env/arm/urdf_to_mjcf.h"
+#include "feeler/env/model/mujoco_handles.h"
 
 namespace feeler::env {
 namespace {
