@@ -10,6 +10,8 @@
 #include <numbers>
 
 #include "feeler/cad/align/candidates.h"
+#include "feeler/cad/align/play.h"
+#include "feeler/cad/align/trials.h"
 #include "feeler/cad/measure/sliding.h"
 #include "feeler/cad/mesh/mesh_tree.h"
 #include "feeler/core/error.h"
@@ -20,33 +22,9 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 /// What is in by less than this is not in.
 constexpr double kLeastEngaged_m = 4e-4;
-/// Play of more than this share of the feature is no fit.
-constexpr double kMostSlack = 0.35;
 /// Verified by sliding, the most promising first.
 constexpr std::size_t kMostTrials = 120;
 constexpr double kAbove_m = 1e-3;
-/// Parts that overlap by less than this touch.
-constexpr double kTouch_m = 5e-6;
-
-/// A part turned so that one of its directions is z.
-struct Turned {
-  Eigen::Matrix3d rotation;
-  TriangleMesh mesh;
-  std::vector<Feature> features;
-  std::unique_ptr<MeshTree> tree;
-};
-
-struct Trial {
-  std::size_t tool = 0;  ///< number of the direction
-  std::size_t target = 0;
-  double roll_rad = 0.0;
-  Eigen::Vector2d place;  ///< of the turned tool's origin, in x and y
-  bool tool_has_opening = false;
-  double high_m = 0.0;  ///< of the feature of the target
-  double low_m = 0.0;
-  double size_m = 0.0;  ///< of the inner feature
-  double fit = 0.0;     ///< area of what goes in, over that of the hole
-};
 
 struct Found {
   Trial trial;
@@ -71,134 +49,6 @@ double AreaInHoles(const std::vector<SlabLoop>& inside, const std::vector<SlabLo
     box.extend(BoundsOf(loop));
   }
   return area;
-}
-
-Eigen::Matrix3d Roll(double angle) {
-  Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  for (double& value : rotation.reshaped()) {
-    if (std::abs(value - std::round(value)) < 1e-12) value = std::round(value);
-  }
-  return rotation;
-}
-
-Turned TurnedPart(const TriangleMesh& mesh, const Eigen::Matrix3d& rotation) {
-  Turned part;
-  part.rotation = rotation;
-  Pose pose = Pose::Identity();
-  pose.linear() = rotation;
-  part.mesh = Transformed(mesh, pose);
-  part.features = FeaturesOf(part.mesh);
-  return part;
-}
-
-/// `with_ends`: of the whole slab, not of its middle alone.
-Eigen::AlignedBox2d RolledBounds(const SlabLoop& loop, double roll, bool with_ends = false) {
-  const Eigen::Rotation2Dd rotation(roll);
-  Eigen::AlignedBox2d box;
-  for (const SlabPoint& p : loop) {
-    box.extend(rotation * p.middle);
-    if (!with_ends) continue;
-    box.extend(rotation * p.low);
-    box.extend(rotation * p.high);
-  }
-  return box;
-}
-
-/// The box around all material up to the upper end of a feature: where the tip is narrower than what follows (a latch),
-/// it is this that has to come into the hole.
-Eigen::AlignedBox2d TipBounds(const std::vector<Feature>& features, const Feature& upto, double roll) {
-  Eigen::AlignedBox2d box;
-  for (const Feature& feature : features) {
-    if (!feature.hole && feature.low_m < upto.high_m - 1e-9) box.extend(RolledBounds(feature.loop, roll, true));
-  }
-  return box;
-}
-
-std::vector<double> Rolls(const Feature& tool, const Feature& target) {
-  std::vector<double> rolls{0.0, kPi / 2, kPi, 1.5 * kPi};
-  if (tool.has_edges && target.has_edges) {
-    for (int k = 0; k < 4; ++k) {
-      double roll = target.edge_rad - tool.edge_rad + k * kPi / 2;
-      roll -= 2 * kPi * std::floor(roll / (2 * kPi) + 1e-9);
-      if (std::none_of(rolls.begin(), rolls.end(), [&](double r) { return std::abs(r - roll) < 1e-4; }))
-        rolls.push_back(roll);
-    }
-  }
-  return rolls;
-}
-
-/// The nearest of what does not fit, for the message.
-struct Miss {
-  double too_wide_m = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d inner = Eigen::Vector2d::Zero();
-  Eigen::Vector2d hole = Eigen::Vector2d::Zero();
-};
-
-/// A taper goes into a taper as deep as it will: what has to fit is the tool's lower end into the target's upper.
-/// (Their middles tell nothing, for the two are seldom equally long.)
-struct Ends {
-  const SlabLoop& tool;
-  const SlabLoop& target;
-  bool tapers;
-};
-Ends EndsThatMeet(const Feature& tool, const Feature& target) {
-  const int narrow_below = tool.hole ? -1 : 1;  // a tip narrows downwards, the hole of a tool upwards
-  const bool tapers = tool.tapers == narrow_below && target.tapers == narrow_below;
-  if (!tapers) return {tool.loop, target.loop, false};
-  return {tool.low_loop, target.high_loop, true};
-}
-
-void AddTrials(const std::vector<Turned>& tools, const std::vector<Turned>& targets, std::vector<Trial>& trials,
-               Miss& miss) {
-  for (std::size_t a = 0; a < tools.size(); ++a) {
-    for (std::size_t b = 0; b < targets.size(); ++b) {
-      for (const Feature& f : tools[a].features) {
-        for (const Feature& g : targets[b].features) {
-          if (f.hole == g.hole) continue;
-          const Ends ends = EndsThatMeet(f, g);
-          double fit = f.hole ? g.area / f.area : f.area / g.area;
-          if (ends.tapers) fit = std::min(fit, 1.0);
-          if (fit < 0.25 || fit > 1.15) continue;
-          for (const double roll : Rolls(f, g)) {
-            const Eigen::AlignedBox2d tool_box = RolledBounds(ends.tool, roll);
-            const Eigen::AlignedBox2d target_box = BoundsOf(ends.target);
-            const Eigen::Vector2d inner = f.hole ? target_box.sizes() : tool_box.sizes();
-            const Eigen::Vector2d hole = f.hole ? tool_box.sizes() : target_box.sizes();
-            const double too_wide = (inner - hole).maxCoeff();
-            if (too_wide > 0 || fit > 1) {
-              if (std::max(too_wide, 0.0) < miss.too_wide_m && fit > 0.6) miss = {std::max(too_wide, 0.0), inner, hole};
-              continue;
-            }
-            const auto add = [&](const Eigen::Vector2d& place) {
-              trials.push_back({a, b, roll, place, f.hole, g.high_m, g.low_m, inner.minCoeff(), fit});
-            };
-            add(target_box.center() - tool_box.center());
-            if (f.hole || ends.tapers) continue;
-            const Eigen::AlignedBox2d tip = TipBounds(tools[a].features, f, roll);
-            if ((tip.sizes() - hole).maxCoeff() > 0 || (tip.center() - tool_box.center()).norm() < 1e-5) continue;
-            add(target_box.center() - tip.center());
-          }
-        }
-      }
-    }
-  }
-  std::stable_sort(trials.begin(), trials.end(), [](const Trial& x, const Trial& y) { return x.fit > y.fit + 1e-6; });
-}
-
-/// Puts the tool into the middle of its play across; false when it has too much or none.
-bool Center(const MeshSlide& slide, double most_m, Eigen::Vector3d& offset, double& slack_m) {
-  for (int round = 0; round < 3; ++round) {
-    slack_m = 0;
-    for (int axis = 0; axis < 2; ++axis) {
-      const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
-      const double up = slide.Travel(offset, unit, most_m);
-      const double down = slide.Travel(offset, -unit, most_m);
-      if (up >= most_m || down >= most_m) return false;
-      offset += 0.5 * (up - down) * unit;
-      slack_m = std::max(slack_m, 0.5 * (up + down));
-    }
-  }
-  return slack_m > 2e-7;
 }
 
 std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const Trial& trial) {
@@ -252,13 +102,6 @@ std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const
 double Strangeness(const Found& found) {
   return 16.0 * static_cast<double>(found.trial.target) + 4.0 * static_cast<double>(found.trial.tool) +
          std::min(found.trial.roll_rad, 2 * kPi - found.trial.roll_rad);
-}
-
-Pose FrameOf(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& offset) {
-  Pose pose = Pose::Identity();
-  pose.linear() = rotation;
-  pose.translation() = offset;
-  return pose;
 }
 
 /// Whether two ways in lead to one place: what is in holes lies there, or the tool stands there.
@@ -342,9 +185,8 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
   // The first direction of a tool is its CAD frame's -z: it comes down.
   for (const Eigen::Vector3d& d : CandidateDirections(tool)) tools.push_back(TurnedPart(tool, RotationToZ(d)));
   for (const Eigen::Vector3d& d : CandidateDirections(target)) targets.push_back(TurnedPart(target, RotationToZ(d)));
-  std::vector<Trial> trials;
   Miss miss;
-  AddTrials(tools, targets, trials, miss);
+  const std::vector<Trial> trials = TrialsOf(tools, targets, miss);
   if (trials.empty()) NoFit(miss, false);
   std::vector<Found> found;
   std::size_t tried = 0;
@@ -380,58 +222,16 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
     alignment.notes.push_back(fmt::format(
         "the parts go together in {} ways that are alike; taken is the one nearest to the CAD frames", equals.size()));
   const Turned& chosen_target = targets[best->trial.target];
-  alignment.frame_T_tool = FrameOf(Roll(best->trial.roll_rad) * tools[best->trial.tool].rotation, best->offset);
+  Eigen::Vector3d offset = best->offset;
+  double roll_rad = best->trial.roll_rad;
+  if (best->trial.roll_is_about)
+    CenterRoll(tools[best->trial.tool].mesh, *chosen_target.tree, best->middle, offset, roll_rad);
+  alignment.frame_T_tool = FrameOf(Roll(roll_rad) * tools[best->trial.tool].rotation, offset);
   alignment.frame_T_target = FrameOf(chosen_target.rotation, Eigen::Vector3d::Zero());
   alignment.tool_has_opening = best->trial.tool_has_opening;
   alignment.engaged_m = best->engaged_m;
   alignment.slack_m = best->slack_m;
   return alignment;
-}
-
-Alignment AlignAssembled(const TriangleMesh& tool, const TriangleMesh& target) {
-  std::optional<Alignment> best;
-  bool apart = false;  // along some direction
-  std::vector<Eigen::Vector3d> directions = CandidateDirections(target);
-  for (const Eigen::Vector3d& d : CandidateDirections(tool)) {
-    if (std::none_of(directions.begin(), directions.end(), [&](const auto& known) { return known.dot(d) > 0.99996; }))
-      directions.push_back(d);
-  }
-  for (const Eigen::Vector3d& direction : directions) {
-    const Pose turn = FrameOf(RotationToZ(direction), Eigen::Vector3d::Zero());
-    const TriangleMesh turned_tool = Transformed(tool, turn);
-    const TriangleMesh turned_target = Transformed(target, turn);
-    const MeshTree tree(turned_target);
-    const MeshSlide slide(turned_tool, tree);
-    const Box tool_box = BoundsOf(turned_tool);
-    const double out = BoundsOf(turned_target).sizes().z() + tool_box.sizes().z();
-    // A tool that stands on the floor touches it: judged a little above.
-    Eigen::Vector3d offset = kTouch_m * Eigen::Vector3d::UnitZ();
-    if (slide.Overlap(offset)) continue;
-    apart = true;
-    if (slide.Travel(offset, Eigen::Vector3d::UnitZ(), out) < out) continue;
-    double slack = 0;
-    const double most = kMostSlack * std::min(tool_box.sizes().x(), tool_box.sizes().y());
-    if (!Center(slide, most, offset, slack)) continue;
-    if (best && best->slack_m <= slack * (1 + 1e-6)) continue;
-    offset.z() = 0;
-    Alignment alignment;
-    alignment.frame_T_tool = FrameOf(turn.linear(), offset);
-    alignment.frame_T_target = turn;
-    alignment.slack_m = slack;
-    if (offset.norm() > 2e-6)
-      alignment.notes.push_back(fmt::format("the tool is moved by {:.3f}, {:.3f} mm to the middle of its play",
-                                            1000 * offset.x(), 1000 * offset.y()));
-    best = alignment;
-  }
-  if (!apart) {
-    throw InputError("tool and target", "overlap as they are placed",
-                     "place them as assembled, with clearance all around");
-  }
-  if (!best) {
-    throw InputError("tool and target", "the tool does not come out along any axis with play, but little, to all sides",
-                     "place them as assembled; the parts have to be in each other");
-  }
-  return *best;
 }
 
 }  // namespace feeler::cad

@@ -10,7 +10,9 @@ namespace {
 
 constexpr double kSameDirection = 0.99996;  // cosine of half a degree
 constexpr std::size_t kMostNormals = 8;
-constexpr double kLeastShare = 0.02;  ///< of the surface, for a normal to count
+constexpr double kLeastShare = 0.02;  ///< of the surface, or of its edges, for a direction to count
+constexpr double kExactly = 0.999999875;  ///< cosine of what a file of six digits leaves open, 5e-4
+constexpr double kBend = 0.01;            ///< sine of the angle at an edge, from which on it is one
 constexpr std::size_t kMostSlabs = 24;
 constexpr std::size_t kMostLevels = 200;
 
@@ -46,45 +48,129 @@ void Dominant(Feature& feature) {
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh) {
-  struct Group {
-    Eigen::Vector3d normal;
-    double area;
-  };
-  std::vector<Group> groups;
+namespace {
+
+struct Direction {
+  Eigen::Vector3d unit;
+  double weight;  ///< area or length
+};
+
+/// Directions that are one, either way round, gathered: the first of each, which has the largest weight, and the sum.
+/// What is fewer than `least` is left out.
+std::vector<Direction> Gathered(std::vector<Direction> all, double same, int least) {
+  constexpr std::size_t kMostGroups = 2000;
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Direction& a, const Direction& b) { return a.weight > b.weight * (1 + 1e-9); });
+  std::vector<Direction> groups;
+  std::vector<int> counts;
+  for (const Direction& one : all) {
+    const auto known = std::find_if(groups.begin(), groups.end(), [&](const Direction& group) {
+      return std::abs(group.unit.dot(one.unit)) >= same;
+    });
+    if (known != groups.end()) {
+      known->weight += one.weight;
+      ++counts[static_cast<std::size_t>(known - groups.begin())];
+    } else if (groups.size() < kMostGroups) {
+      groups.push_back(one);
+      counts.push_back(1);
+    }
+  }
+  for (std::size_t i = groups.size(); i-- > 0;) {
+    if (counts[i] < least) groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const Direction& a, const Direction& b) { return a.weight > b.weight * (1 + 1e-9); });
+  return groups;
+}
+
+/// Those with the largest weights, and a share of the sum.
+std::vector<Direction> Largest(std::vector<Direction> groups, double least_share) {
   double total = 0;
+  for (const Direction& group : groups) total += group.weight;
+  if (groups.size() > kMostNormals) groups.resize(kMostNormals);
+  std::erase_if(groups, [&](const Direction& group) { return group.weight < least_share * total; });
+  return groups;
+}
+
+std::vector<Direction> NormalsOf(const TriangleMesh& mesh) {
+  std::vector<Direction> normals;
   for (int t = 0; t < mesh.size(); ++t) {
     const Eigen::Vector3d area = AreaVector(mesh, t);
     const double size = area.norm();
-    if (size < 1e-14) continue;
-    total += size;
-    Eigen::Vector3d normal = area / size;
-    bool found = false;
-    for (Group& group : groups) {
-      if (std::abs(group.normal.dot(normal)) < kSameDirection) continue;
-      group.area += size;
-      found = true;
-      break;
-    }
-    if (!found && groups.size() < 2000) groups.push_back({normal, size});
+    if (size >= 1e-14) normals.push_back({area / size, size});
   }
-  std::stable_sort(groups.begin(), groups.end(),
-                   [](const Group& a, const Group& b) { return a.area > b.area * (1 + 1e-9); });
-  std::vector<Eigen::Vector3d> directions;
-  const auto add = [&](const Eigen::Vector3d& d) {
-    for (const Eigen::Vector3d& known : directions) {
-      if (known.dot(d) > kSameDirection) return;
-    }
-    directions.push_back(d);
+  return Gathered(std::move(normals), kSameDirection, 1);
+}
+
+/// Edges at which the surface bends: those along a bore, a prism or a slot are parallel to its axis, however it lies.
+std::vector<Direction> BentEdgesOf(const TriangleMesh& mesh) {
+  struct Use {
+    std::array<int, 2> edge;
+    int triangle;
   };
-  for (const int axis : {2, 0, 1}) {
-    add(Eigen::Vector3d::Unit(axis));
-    add(-Eigen::Vector3d::Unit(axis));
+  std::vector<Use> uses;
+  uses.reserve(3 * mesh.triangles.size());
+  for (int t = 0; t < mesh.size(); ++t) {
+    const auto& c = mesh.triangles[static_cast<std::size_t>(t)];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int i = c[k];
+      const int j = c[(k + 1) % 3];
+      uses.push_back({{std::min(i, j), std::max(i, j)}, t});
+    }
   }
-  for (std::size_t i = 0; i < std::min(groups.size(), kMostNormals); ++i) {
-    if (groups[i].area < kLeastShare * total) break;
-    add(groups[i].normal);
-    add(-groups[i].normal);
+  std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) {
+    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
+  });
+  std::vector<Direction> edges;
+  for (std::size_t i = 0; i + 1 < uses.size(); ++i) {
+    if (uses[i].edge != uses[i + 1].edge) continue;
+    const Eigen::Vector3d a = AreaVector(mesh, uses[i].triangle);
+    const Eigen::Vector3d b = AreaVector(mesh, uses[i + 1].triangle);
+    if (a.cross(b).norm() <= kBend * a.norm() * b.norm()) continue;
+    const Eigen::Vector3d along = mesh.points[static_cast<std::size_t>(uses[i].edge[1])] -
+                                  mesh.points[static_cast<std::size_t>(uses[i].edge[0])];
+    const double length = along.norm();
+    if (length > 1e-6) edges.push_back({along / length, length});
+  }
+  // The lines of a cone, or of what tapers, are not parallel.
+  constexpr int kLeastEdges = 3;
+  return Gathered(std::move(edges), kExactly, kLeastEdges);
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> ShapeDirections(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> directions;
+  for (const std::vector<Direction>& some :
+       {Largest(NormalsOf(mesh), kLeastShare), Largest(BentEdgesOf(mesh), kLeastShare)}) {
+    for (const Direction& d : some) {
+      const bool known = std::any_of(directions.begin(), directions.end(), [&](const Eigen::Vector3d& other) {
+        return std::abs(other.dot(d.unit)) > kSameDirection;
+      });
+      if (!known) directions.push_back(d.unit);
+    }
+  }
+  return directions;
+}
+
+std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> shape = ShapeDirections(mesh);
+  std::vector<Eigen::Vector3d> directions;
+  for (const int axis : {2, 0, 1}) {
+    Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
+    // A part that stands a little aslant in its frame has its own axis.
+    for (const Eigen::Vector3d& d : shape) {
+      const double along = d[axis];
+      if (std::abs(along) > kSameDirection && std::abs(along) < kExactly) unit = along > 0 ? d : Eigen::Vector3d(-d);
+    }
+    directions.push_back(unit);
+    directions.push_back(-unit);
+  }
+  for (const Eigen::Vector3d& d : shape) {
+    if (std::any_of(directions.begin(), directions.end(), [&](const auto& known) { return known.dot(d) > kSameDirection; }))
+      continue;
+    directions.push_back(d);
+    directions.push_back(-d);
   }
   return directions;
 }
@@ -180,6 +266,7 @@ std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
       feature.high_loop = UpperEnd(chain.back().loop);
     }
     Dominant(feature);
+    feature.profile = ProfileOf(feature.loop);
     features.push_back(std::move(feature));
   }
   return features;

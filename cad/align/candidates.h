@@ -3,13 +3,17 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "feeler/cad/align/profile.h"
 #include "feeler/cad/mesh/triangle_mesh.h"
 #include "feeler/cad/section/section.h"
 
 namespace feeler::cad {
 
-/// Directions along which a part may be meant to move: the axes of its CAD frame, and the normals of its larger flat
-/// faces; both ways. Unit vectors, no two within half a degree.
+/// Directions that the shape of a part has: the normals of its larger flat faces, and those in which most of the length
+/// of its edges runs, as along the sides of a bore or a slot. Unit vectors, one way, no two within half a degree.
+std::vector<Eigen::Vector3d> ShapeDirections(const TriangleMesh& mesh);
+
+/// Directions along which a part may be meant to move: the axes of its CAD frame, and those of its shape; both ways.
 std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh);
 
 /// The rotation that brings `direction` to +z by the shortest way, exactly for axes.
@@ -26,7 +30,8 @@ struct Feature {
   int tapers = 0;          ///< 1: it widens upwards, -1: downwards
   double area = 0.0;       ///< m^2, positive; half-way
   double edge_rad = 0.0;   ///< direction in which most of its length runs, modulo half a turn
-  bool has_edges = false;  ///< else it is round: every direction is as good
+  bool has_edges = false;  ///< else no direction stands out
+  Profile profile;         ///< half-way
 };
 
 /// The loops of a part whose cross-sections across z are looked at at its thicker slabs.

@@ -5,11 +5,13 @@
 #include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRepBuilderAPI_MakePolygon.hxx>
 #include <BRepBuilderAPI_Transform.hxx>
+#include <BRepFilletAPI_MakeFillet.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCone.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepPrimAPI_MakePrism.hxx>
+#include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepPrimAPI_MakeWedge.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
@@ -20,6 +22,7 @@
 #include <TopLoc_Location.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Compound.hxx>
+#include <TopoDS_Edge.hxx>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -29,6 +32,7 @@
 #include <utility>
 
 #include "feeler/cad/folder/task_folder.h"
+#include "feeler/core/random.h"
 
 namespace feeler::cad {
 namespace {
@@ -65,6 +69,15 @@ Shape Turned(const Shape& shape, const gp_Dir& axis, double degrees) {
   gp_Trsf turn;
   turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), axis), degrees * kPi / 180);
   return BRepBuilderAPI_Transform(shape, turn, true).Shape();
+}
+
+Shape Placed(const Shape& shape, const Eigen::Isometry3d& pose) {
+  if (pose.isApprox(Eigen::Isometry3d::Identity(), 1e-15)) return shape;
+  const Eigen::Matrix3d r = pose.linear();
+  const Eigen::Vector3d t = pose.translation();
+  gp_Trsf place;
+  place.SetValues(r(0, 0), r(0, 1), r(0, 2), t.x(), r(1, 0), r(1, 1), r(1, 2), t.y(), r(2, 0), r(2, 1), r(2, 2), t.z());
+  return BRepBuilderAPI_Transform(shape, place, true).Shape();
 }
 
 /// A rectangle that widens upwards by as much as it is high: what a chamfer of 45 degrees takes away.
@@ -208,6 +221,113 @@ Pair TwoMouths() {
                                                        Box3(15 - 4 - c, 15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1))};
 }
 
+/// A round shaft with a key.
+Shape KeyedRod(double grow, double z0, double z1) {
+  return Rod(0, 0, 6 + grow, z0, z1) + Box3(4, 7.5 + grow, -1.5 - grow, 1.5 + grow, z0, z1);
+}
+
+Pair KeyedShaft() {
+  const double c = 0.1;
+  return {KeyedRod(0, 0, 45), Block(30, 30, -16, 0) - KeyedRod(c, -12, 1)};
+}
+
+Shape Teeth(int count, double root, double tip, double z0, double z1) {
+  Points points;
+  for (int k = 0; k < count; ++k) {
+    for (const auto& [share, radius] : {std::pair{0.0, root}, {0.3, root}, {0.4, tip}, {0.6, tip}, {0.7, root}}) {
+      if (share == 0.0 && k > 0) continue;
+      const double a = 2 * kPi * (k + share) / count;
+      points.emplace_back(radius * std::cos(a), radius * std::sin(a));
+    }
+  }
+  return Prism(points, z0, z1);
+}
+
+/// A gear with a keyway over a post with a key.
+Pair KeyedGear() {
+  const double c = 0.1;
+  return {Teeth(20, 13, 15.6, 0, 10) - KeyedRod(c, -1, 11), Block(60, 60, -8, 0) + KeyedRod(0, -1, 18)};
+}
+
+/// A pinion that goes into a ring with teeth inside.
+Pair RingGear() {
+  const double c = 0.15;
+  return {Teeth(12, 7, 9, 0, 40), Rod(0, 0, 18, -14, 0) - Teeth(12, 7 + c, 9 + c, -10, 1)};
+}
+
+Pair Hexagon() {
+  return {Prism(Regular(6, 10.0), 0, 45), Block(30, 26, -16, 0) - Prism(Regular(6, 10.2), -11, 1)};
+}
+
+/// Three round pins, each as every other.
+Pair RoundPins() {
+  const auto pins = [](double grow, double z0, double z1) {
+    return Rod(0, 0, 1.5 + grow, z0, z1) + Rod(11, 0, 1.5 + grow, z0, z1) + Rod(3, 8, 1.5 + grow, z0, z1);
+  };
+  return {pins(0, 0, 13) + Box3(-5, 16, -5, 13, 12, 50), Box3(-12, 24, -12, 20, -18, 0) - pins(0.15, -12, 1)};
+}
+
+Points Oval(double a, double b) {
+  Points points;
+  for (int k = 0; k < 90; ++k) points.emplace_back(a * std::cos(2 * kPi * k / 90), b * std::sin(2 * kPi * k / 90));
+  return points;
+}
+
+/// No corner and no straight side.
+Pair Ellipse() {
+  const double c = 0.15;
+  return {Prism(Oval(7, 4.5), 0, 45), Block(30, 26, -15, 0) - Prism(Oval(7 + c, 4.5 + c), -10, 1)};
+}
+
+/// A hole whose axis leans against every face of its block.
+Pair Oblique(const Shape& peg, const Shape& hole) {
+  Shape lean = Turned(Turned(hole, gp_Dir(0, 1, 0), 28), gp_Dir(0, 0, 1), 17);
+  return {peg, Block(44, 40, -22, 0) - Moved(lean, 2, 1, -4)};
+}
+
+Pair ObliqueBore() { return Oblique(Rod(0, 0, 4, 0, 50), Rod(0, 0, 4.1, -10, 20)); }
+Pair ObliqueSlot() { return Oblique(Block(9, 6, 0, 50), Block(9.3, 6.3, -10, 20)); }
+
+/// A round peg with a hemisphere for a tip, into a bore.
+Pair Domed() {
+  const Shape ball = BRepPrimAPI_MakeSphere(gp_Pnt(0, 0, 5), 5).Shape();
+  return {Rod(0, 0, 5, 5, 50) + ball, Block(30, 30, -20, 0) - Rod(0, 0, 5.12, -15, 1)};
+}
+
+/// All edges for which `wanted` holds of their middle, rounded.
+Shape Rounded(const Shape& shape, double radius, const std::function<bool(const gp_Pnt&)>& wanted) {
+  BRepFilletAPI_MakeFillet fillet(shape);
+  for (TopExp_Explorer edges(shape, TopAbs_EDGE); edges.More(); edges.Next()) {
+    double from = 0;
+    double to = 0;
+    const TopoDS_Edge& edge = TopoDS::Edge(edges.Current());
+    const Handle(Geom_Curve) curve = BRep_Tool::Curve(edge, from, to);
+    if (!curve.IsNull() && wanted(curve->Value(0.5 * (from + to)))) fillet.Add(radius, edge);
+  }
+  return fillet.Shape();
+}
+
+/// Edges of the peg and of the block, and the rim of the hole, are rounded.
+Pair Filleted() {
+  const double c = 0.12;
+  const Shape peg = Rounded(Block(10, 8, 0, 45), 0.8, [](const gp_Pnt&) { return true; });
+  const Shape block = Rounded(Block(34, 30, -18, 0), 2.0, [](const gp_Pnt& p) { return p.Z() > -17; });
+  const Shape hole = Rounded(Block(10 + 2 * c, 8 + 2 * c, -12, 5), 0.8, [](const gp_Pnt& p) {
+    return std::abs(p.X()) > 1 && std::abs(p.Y()) > 1;
+  });
+  return {peg, Rounded(block - hole, 1.0, [](const gp_Pnt& p) {
+            return std::abs(p.Z()) < 1e-6 && std::abs(p.X()) < 8 && std::abs(p.Y()) < 7;
+          })};
+}
+
+/// A bore with a rounded rim.
+Pair FilletedBore() {
+  const Shape peg = Rounded(Rod(0, 0, 5, 0, 45), 1.0, [](const gp_Pnt& p) { return p.Z() < 1; });
+  return {peg, Rounded(Block(30, 30, -18, 0) - Rod(0, 0, 5.1, -12, 1), 1.0, [](const gp_Pnt& p) {
+            return std::abs(p.Z()) < 1e-6 && std::hypot(p.X(), p.Y()) < 6;
+          })};
+}
+
 Pair Draw(const std::string& kind) {
   static const std::vector<std::pair<std::string, std::function<Pair()>>> kKinds = {
       {"keyed", Keyed},
@@ -223,6 +343,18 @@ Pair Draw(const std::string& kind) {
       {"shell", Shell},
       {"chamfered", Chamfered},
       {"chamfered-tee", ChamferedTee},
+      {"keyed-shaft", KeyedShaft},
+      {"keyed-gear", KeyedGear},
+      {"ring-gear", RingGear},
+      {"hexagon", Hexagon},
+      {"round-pins", RoundPins},
+      {"ellipse", Ellipse},
+      {"oblique-bore", ObliqueBore},
+      {"oblique-slot", ObliqueSlot},
+      {"domed", Domed},
+      {"filleted", Filleted},
+      {"filleted-bore", FilletedBore},
+      {"exact", [] { return Rectangle(0); }},
       {"rectangle", [] { return Rectangle(0.1); }},
       {"tilted", Tilted},
       {"assembly", Assembled},
@@ -234,8 +366,8 @@ Pair Draw(const std::string& kind) {
   throw std::invalid_argument("no kind of parts is called " + kind);
 }
 
-TriangleMesh Triangles(const Shape& shape) {
-  BRepMesh_IncrementalMesh(shape, 0.002, Standard_False, 0.1, Standard_False);
+TriangleMesh Triangles(const Shape& shape, double facet_mm, double facet_rad) {
+  BRepMesh_IncrementalMesh(shape, facet_mm, Standard_False, facet_rad, Standard_False);
   TriangleMesh mesh;
   for (TopExp_Explorer faces(shape, TopAbs_FACE); faces.More(); faces.Next()) {
     const TopoDS_Face& face = TopoDS::Face(faces.Current());
@@ -381,6 +513,30 @@ void WriteMesh(const TriangleMesh& mesh, const std::filesystem::path& file, cons
 
 }  // namespace
 
+PartPlacement RolledBy(double degrees) {
+  PartPlacement placement;
+  placement.tool.linear() = Eigen::AngleAxisd(degrees * kPi / 180, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  return placement;
+}
+
+PartPlacement Anyhow(std::uint64_t seed) {
+  RandomStream random(seed, 0, "parts that lie anyhow");
+  const auto draw = [&] {
+    Eigen::Quaterniond q;
+    do {
+      for (int k = 0; k < 4; ++k) q.coeffs()[k] = random.Uniform(-1.0, 1.0);
+    } while (q.norm() > 1 || q.norm() < 0.1);
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = q.normalized().toRotationMatrix();
+    for (int k = 0; k < 3; ++k) pose.translation()[k] = random.Uniform(-50.0, 50.0);
+    return pose;
+  };
+  PartPlacement placement;
+  placement.tool = draw();
+  placement.target = draw();
+  return placement;
+}
+
 std::vector<PartKind> PartKinds() {
   return {{"keyed", 0.15, 0.15, 12.0},    {"d-plug", 0.12, 0.12, 10.0},
           {"usb-a", 0.2, 0.2, 12.0},      {"rj45", 0.13, 0.13, 14.0},
@@ -388,11 +544,19 @@ std::vector<PartKind> PartKinds() {
           {"gear", 0.1, 0.1, 18.0, true}, {"hex-socket", 0.1, 0.1, 8.0, true},
           {"taper", 0.0, 0.0, 0.0},       {"tilted", 0.1, 0.1, 9.0},
           {"chamfered", 0.2, 0.2, 12.0},  {"chamfered-tee", 0.2, 0.2, 12.0},
-          {"shell", 0.2, 0.2, 11.9},      {"assembly", 0.15, 0.15, 12.0, false, true}};
+          {"shell", 0.2, 0.2, 11.9},      {"assembly", 0.15, 0.15, 12.0, false, true},
+          {"keyed-shaft", 0.1, 0.1, 12.0}, {"keyed-gear", 0.1, 0.1, 18.0, true},
+          {"ring-gear", 0.0, 0.0, 10.0},   {"hexagon", 0.1, 0.1, 11.0},
+          {"round-pins", 0.15, 0.15, 12.0}, {"ellipse", 0.15, 0.15, 10.0},
+          {"domed", 0.12, 0.12, 15.0},     {"filleted", 0.12, 0.12, 12.0},
+          {"filleted-bore", 0.1, 0.1, 12.0}, {"oblique-bore", 0.1, 0.1, 0.0}, {"oblique-slot", 0.15, 0.15, 0.0}};
 }
 
-PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format) {
-  const Pair pair = Draw(kind);
+PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format,
+                     const PartPlacement& placement) {
+  Pair pair = Draw(kind);
+  pair.tool = Placed(pair.tool, placement.tool);
+  pair.target = Placed(pair.target, placement.target);
   std::filesystem::create_directories(folder);
   if (format == "assembly") {
     BRep_Builder builder;
@@ -411,7 +575,7 @@ PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folde
     if (format == "step") {
       WriteStep(shape, file);
     } else {
-      WriteMesh(Triangles(shape), file, format);
+      WriteMesh(Triangles(shape, placement.facet_mm, placement.facet_rad), file, format);
     }
   }
   return {tool.string(), target.string()};

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -24,8 +26,21 @@ struct PartFiles {
   std::string tool;  ///< as `--tool` takes it
   std::string target;
 };
+/// Where the CAD frames of the parts lie, and how finely their triangles are made.
+struct PartPlacement {
+  Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();  ///< of the part as drawn, in its frame; millimetres
+  Eigen::Isometry3d target = Eigen::Isometry3d::Identity();
+  double facet_mm = 0.002;  ///< how far triangles may be off the surface
+  double facet_rad = 0.1;
+};
+/// The tool turned about its axis against the target's frame.
+PartPlacement RolledBy(double degrees);
+/// Both in frames that lie anyhow, by a seed: turned in all directions and moved by up to 50 mm.
+PartPlacement Anyhow(std::uint64_t seed);
+
 /// Draws a kind and writes its parts into a folder. `format`: "step", "stl" and "ply" (binary), "stl-ascii",
 /// "ply-ascii", "obj" or "3mf"; "assembly" writes one STEP file with both solids.
-PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format);
+PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format,
+                     const PartPlacement& placement = {});
 
 }  // namespace feeler::cad
