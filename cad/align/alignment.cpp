@@ -20,10 +20,6 @@ namespace feeler::cad {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-/// What is in by less than this is not in.
-constexpr double kLeastEngaged_m = 4e-4;
-/// Verified by sliding, the most promising first.
-constexpr std::size_t kMostTrials = 120;
 constexpr double kAbove_m = 1e-3;
 
 struct Found {
@@ -118,6 +114,15 @@ std::string InMillimetres(const Eigen::Vector3d& p) {
 }
 
 [[noreturn]] void NoFit(const Miss& miss, bool tried) {
+  constexpr double kNone_m = 1e-6;
+  if (miss.too_wide_m < kNone_m) {
+    throw InputError("tool and target",
+                     fmt::format("have no clearance: {:.4f} x {:.4f} mm goes into a hole of {:.4f} x {:.4f} mm",
+                                 1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(),
+                                 1000 * miss.hole.y()),
+                     "a fit without play cannot be simulated with rigid parts: make the hole larger by what the parts "
+                     "have in truth");
+  }
   if (tried) {
     throw InputError("tool and target",
                      "sections of one fit into holes of the other, but no way in leads there along an axis",
@@ -189,9 +194,7 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
   const std::vector<Trial> trials = TrialsOf(tools, targets, miss);
   if (trials.empty()) NoFit(miss, false);
   std::vector<Found> found;
-  std::size_t tried = 0;
   for (const Trial& trial : trials) {
-    if (++tried > kMostTrials) break;
     Turned& turned = targets[trial.target];
     if (!turned.tree) turned.tree = std::make_unique<MeshTree>(turned.mesh);
     if (auto result = Verify(tools[trial.tool], turned, trial)) found.push_back(*result);

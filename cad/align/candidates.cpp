@@ -261,6 +261,9 @@ std::vector<Feature> FeaturesOf(const TriangleMesh& mesh) {
     feature.low_m = chain.front().low_m;
     feature.high_m = chain.back().high_m;
     feature.tapers = Tapers(chain.front().loop, chain.back().loop);
+    const Eigen::Vector2d low = BoundsOf(LowerEnd(chain.front().loop)).center();
+    const Eigen::Vector2d high = BoundsOf(UpperEnd(chain.back().loop)).center();
+    feature.lean = (high - low).norm() / (feature.high_m - feature.low_m);
     if (feature.tapers != 0) {
       feature.low_loop = LowerEnd(chain.front().loop);
       feature.high_loop = UpperEnd(chain.back().loop);

@@ -28,6 +28,7 @@ struct Feature {
   SlabLoop low_loop;       ///< its lower end, as the `middle` of its points; set if it tapers
   SlabLoop high_loop;      ///< its upper end
   int tapers = 0;          ///< 1: it widens upwards, -1: downwards
+  double lean = 0.0;       ///< how far it moves sideways, over its height
   double area = 0.0;       ///< m^2, positive; half-way
   double edge_rad = 0.0;   ///< direction in which most of its length runs, modulo half a turn
   bool has_edges = false;  ///< else no direction stands out

@@ -137,7 +137,7 @@ bool MayFit(const Profile& inner, const Profile& outer, double least_m) {
 }  // namespace
 
 std::vector<double> TurnsInto(const Profile& inner, const Profile& outer, std::size_t most) {
-  if (inner.round || outer.round) return {};
+  if (inner.round || outer.round || inner.farthest_sorted_m.back() <= outer.nearest_sorted_m.front()) return {};
   const double least = -kFarOut_m;
   if (!MayFit(inner, outer, least)) return {};
   std::vector<double> room(kBins, least);

@@ -16,6 +16,9 @@ constexpr std::size_t kMostTurns = 6;
 /// Lines whose distances differ by more do not lie over holes all at once.
 constexpr double kSameDistance_m = 3e-4;
 
+/// Parts with less play across have none.
+constexpr double kNoPlay_m = 1e-6;
+
 struct Turn {
   double roll_rad;
   bool about;   ///< to be found exactly when the tool is in
@@ -75,7 +78,7 @@ class Pairing {
       : tool_(tool), target_(target), a_(a), b_(b) {
     for (const Feature& f : tool_) {
       for (const Feature& g : target_) {
-        if (f.hole == g.hole) continue;
+        if (f.hole == g.hole || g.high_m - g.low_m < kLeastEngaged_m) continue;
         const double fit = FitOf(f, g);
         if (fit >= 0.25 && fit <= 1.15) matches_.push_back({&f, &g, fit});
       }
@@ -142,14 +145,15 @@ class Pairing {
   /// Not the walls of what mates, but a tip, a lead-in, or what is cut aslant.
   static bool IsSteep(const Feature& feature) {
     constexpr double kSteep = 0.2;
-    return feature.tapers != 0 && SlopeOf(feature) > kSteep;
+    constexpr double kLeans = 0.1;
+    return feature.lean > kLeans || (feature.tapers != 0 && SlopeOf(feature) > kSteep);
   }
 
   /// Parts that mate do so along walls that lie along the way in, or taper alike; by chance others fit.
   static int RankOf(const Match& match, bool contained) {
     if (!contained) return 3;
-    if (match.tool->tapers == 0 && match.target->tapers == 0) return 0;
-    return EndsThatMeet(*match.tool, *match.target).tapers ? 1 : 2;
+    if (EndsThatMeet(*match.tool, *match.target).tapers) return 1;
+    return match.tool->tapers == 0 && match.target->tapers == 0 ? 0 : 2;
   }
 
   std::vector<Turn> TurnsOf(const Match& match) const {
@@ -211,10 +215,10 @@ class Pairing {
     const Eigen::Vector2d inner = f.hole ? target_box.sizes() : tool_box.sizes();
     const Eigen::Vector2d hole = f.hole ? tool_box.sizes() : target_box.sizes();
     const double too_wide = (inner - hole).maxCoeff();
-    if (too_wide > 0 || match.fit > 1) {
-      if (std::max(too_wide, 0.0) < miss.too_wide_m && match.fit > 0.6) miss = {std::max(too_wide, 0.0), inner, hole};
-      return;
-    }
+    const bool misses = too_wide > 0 || match.fit > 1;
+    if ((misses || too_wide > -kNoPlay_m) && match.fit > 0.6 && std::max(too_wide, 0.0) < miss.too_wide_m)
+      miss = {std::max(too_wide, 0.0), inner, hole};
+    if (misses) return;
     const bool round = f.profile.round && g.profile.round;
     const bool by_chance = (IsSteep(f) || IsSteep(g)) && !ends.tapers;
     const auto add = [&](const Eigen::Vector2d& at) {
@@ -282,7 +286,18 @@ std::vector<Trial> TrialsOf(const std::vector<Turned>& tools, const std::vector<
     if (x.held != y.held) return x.held > y.held;
     return x.fit > y.fit + 1e-6;
   });
-  return trials;
+  // Lines above each other that lead to one place say the same.
+  std::vector<Trial> distinct;
+  for (const Trial& trial : trials) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Trial& other) {
+      return other.tool == trial.tool && other.target == trial.target && other.low_m == trial.low_m &&
+             other.high_m == trial.high_m && other.tool_has_opening == trial.tool_has_opening &&
+             std::abs(other.roll_rad - trial.roll_rad) < 1e-6 && (other.place - trial.place).norm() < 1e-6;
+    });
+    if (!known) distinct.push_back(trial);
+    if (distinct.size() == kMostTrials) break;
+  }
+  return distinct;
 }
 
 }  // namespace feeler::cad

@@ -37,6 +37,11 @@ struct Trial {
   bool roll_is_about = false;  ///< no sides say what it is exactly
 };
 
+/// What is in by less than this is not in.
+inline constexpr double kLeastEngaged_m = 4e-4;
+/// Slid along, the most promising first.
+inline constexpr std::size_t kMostTrials = 120;
+
 /// The nearest of what does not fit, for the message.
 struct Miss {
   double too_wide_m = std::numeric_limits<double>::infinity();
@@ -46,7 +51,7 @@ struct Miss {
 
 /// Every line around material of one part with every hole of the other that it may go into, along every direction of
 /// both, turned so that edges are parallel, or radii fit, or several lines lie over several holes; the most promising
-/// first.
+/// first, kMostTrials at most.
 std::vector<Trial> TrialsOf(const std::vector<Turned>& tools, const std::vector<Turned>& targets, Miss& miss);
 
 }  // namespace feeler::cad

@@ -11,6 +11,7 @@ extern "C" {
 #include <limits>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 
 #include "feeler/cad/mesh/mesh_tree.h"
 
@@ -119,6 +120,54 @@ std::optional<ConvexPiece> HullOf(const std::vector<Eigen::Vector3d>& points) {
   piece.bounds = BoundsOf(piece.surface);
   if (piece.volume < 1e-15) return std::nullopt;
   return piece;
+}
+
+ConvexPiece WithFewerCorners(const ConvexPiece& piece,
+                             const std::function<double(const Eigen::Vector3d&)>& tolerance_at) {
+  const std::vector<Eigen::Vector3d>& points = piece.surface.points;
+  std::vector<bool> kept(points.size(), false);
+  const auto keep_farthest = [&](const Eigen::Vector3d& way) {
+    const auto farther = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return way.dot(a) < way.dot(b); };
+    kept[static_cast<std::size_t>(std::max_element(points.begin(), points.end(), farther) - points.begin())] = true;
+  };
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        if (x != 0 || y != 0 || z != 0) keep_farthest(Eigen::Vector3d(x, y, z));
+      }
+    }
+  }
+  while (true) {
+    std::vector<Eigen::Vector3d> some;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (kept[i]) some.push_back(points[i]);
+    }
+    std::optional<ConvexPiece> hull = HullOf(some);
+    if (!hull) return piece;
+    // Of what stands out over each face that which does so farthest, in shares of its tolerance.
+    std::vector<std::pair<double, std::size_t>> worst(hull->planes.size(), {1.0, points.size()});
+    bool any = false;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (kept[i]) continue;
+      double out = 0;
+      std::size_t over = 0;
+      for (std::size_t k = 0; k < hull->planes.size(); ++k) {
+        const double above = hull->planes[k].normal.dot(points[i]) - hull->planes[k].offset_m;
+        if (above > out) {
+          out = above;
+          over = k;
+        }
+      }
+      const double share = out / tolerance_at(points[i]);
+      if (share <= worst[over].first) continue;
+      worst[over] = {share, i};
+      any = true;
+    }
+    if (!any) return *std::move(hull);
+    for (const auto& [share, point] : worst) {
+      if (point < points.size()) kept[point] = true;
+    }
+  }
 }
 
 double DistanceTo(const ConvexPiece& piece, const Eigen::Vector3d& point) {

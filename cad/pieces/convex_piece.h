@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -25,6 +26,11 @@ struct ConvexPiece {
 
 /// The convex hull of points (Qhull); empty where they have no volume.
 std::optional<ConvexPiece> HullOf(const std::vector<Eigen::Vector3d>& points);
+
+/// The piece with fewer corners: those are left out that stay within the tolerance at their place of the faces of the
+/// rest.
+ConvexPiece WithFewerCorners(const ConvexPiece& piece,
+                             const std::function<double(const Eigen::Vector3d&)>& tolerance_at);
 
 /// 0 inside, else the distance to the piece, m.
 double DistanceTo(const ConvexPiece& piece, const Eigen::Vector3d& point);

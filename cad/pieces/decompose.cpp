@@ -10,6 +10,7 @@
 
 #include "feeler/cad/mesh/mesh_tree.h"
 #include "feeler/cad/pieces/clip.h"
+#include "feeler/cad/pieces/columns.h"
 #include "feeler/cad/section/convex_partition.h"
 #include "feeler/cad/section/section.h"
 
@@ -146,11 +147,16 @@ void CutSlab(const Slab& slab, double tolerance_m, int halvings, std::vector<Con
   }
 }
 
-std::vector<ConvexPiece> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options) {
-  constexpr int kHalvings = 6;
+/// The bodies of all slabs; nothing where they are more than `most`.
+std::optional<std::vector<ConvexPiece>> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options,
+                                                   std::size_t most) {
+  constexpr int kMostHalvings = 6;
   const double tolerance_m = 0.5 * std::min(options.tolerance_near_m, options.tolerance_far_m);
   std::vector<ConvexPiece> pieces;
-  for (const Slab& slab : slabs) CutSlab(slab, tolerance_m, kHalvings, pieces);
+  for (const Slab& slab : slabs) {
+    CutSlab(slab, tolerance_m, kMostHalvings, pieces);
+    if (pieces.size() > most) return std::nullopt;
+  }
   return pieces;
 }
 
@@ -262,15 +268,29 @@ bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const Decompose
 }
 
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options) {
-  return *DecomposeIfFew(solid, options, std::numeric_limits<std::size_t>::max());
+  constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
+  return *DecomposeIfFew(solid, options, kAny, kAny);
 }
 
 std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid, const DecomposeOptions& options,
-                                                       std::size_t most_bodies) {
-  std::vector<ConvexPiece> bodies = Elementary(SlabsOf(solid, options), options);
-  if (bodies.size() > most_bodies) return std::nullopt;
+                                                       std::size_t most_bodies, std::size_t most_pieces) {
   const MeshTree tree(solid);
-  return Merger(std::move(bodies), tree, options).Run();
+  if (auto hull = HullOf(solid.points); hull && StaysInside(*hull, tree, options))
+    return std::vector<ConvexPiece>{std::move(*hull)};
+  const bool free_form = static_cast<int>(LevelsOf(solid, kLevel_m).size()) > options.most_slabs + 1;
+  const std::vector<Slab> slabs = SlabsOf(solid, options);
+  constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
+  if (!free_form || most_pieces == kAny) {
+    if (auto bodies = Elementary(slabs, options, most_bodies)) {
+      std::vector<ConvexPiece> pieces = Merger(std::move(*bodies), tree, options).Run();
+      if (pieces.size() <= most_pieces) return pieces;
+    }
+  }
+  auto columns = ColumnsOf(slabs, !free_form, tree, options, std::min(most_bodies, 2 * most_pieces));
+  if (!columns) return std::nullopt;
+  std::vector<ConvexPiece> pieces = Merger(std::move(*columns), tree, options).Run();
+  if (pieces.size() > most_pieces) return std::nullopt;
+  return pieces;
 }
 
 }  // namespace feeler::cad

@@ -5,14 +5,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <assimp/Importer.hpp>
-#include <cctype>
-#include <charconv>
-#include <cstring>
-#include <fstream>
 #include <string_view>
+#include <utility>
 
+#include "feeler/cad/readers/lines.h"
+#include "feeler/cad/readers/read_obj.h"
+#include "feeler/cad/readers/read_stl.h"
+#include "feeler/cad/readers/zip_model.h"
 #include "feeler/core/error.h"
 
 namespace feeler::cad {
@@ -20,169 +20,45 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string Extension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
+std::string Extension(const fs::path& file) { return Lower(file.extension().string()); }
 
 [[noreturn]] void TooMany(const fs::path& file, std::int64_t triangles) {
   throw InputError(file.string(), fmt::format("has {} triangles, more than {}", triangles, kMostTriangles),
                    "export it coarser: a part needs some thousands");
 }
 
-/// Counts the facets of a text file without reading it into memory.
-std::int64_t CountLines(const fs::path& file, std::string_view keyword) {
-  std::ifstream in(file);
-  std::int64_t count = 0;
-  for (std::string line; std::getline(in, line);) {
-    const std::size_t begin = line.find_first_not_of(" \t");
-    if (begin == std::string::npos || line.compare(begin, keyword.size(), keyword) != 0) continue;
-    const std::size_t after = begin + keyword.size();
-    if (after < line.size() && (line[after] == ' ' || line[after] == '\t')) ++count;
-    if (count > kMostTriangles) break;
+/// What the header of a PLY file says.
+std::int64_t CountPly(const fs::path& file) {
+  Lines lines(file);
+  for (std::string line; lines.Next(line) && lines.number() < 1000;) {
+    std::string_view rest(line);
+    const std::string_view word = NextWord(rest);
+    double count = 0;
+    if (word == "end_header") break;
+    if (word == "element" && NextWord(rest) == "face" && NextNumber(rest, count)) return static_cast<std::int64_t>(count);
   }
-  return count;
+  return 0;
 }
 
-/// A binary STL is as long as its count says; many begin with "solid" all the same.
-std::optional<std::int64_t> BinaryStlTriangles(const fs::path& file) {
-  std::error_code error;
-  const auto size = static_cast<std::int64_t>(fs::file_size(file, error));
-  if (error || size < 84) return std::nullopt;
-  std::ifstream in(file, std::ios::binary);
-  in.seekg(80);
-  std::array<unsigned char, 4> bytes{};
-  in.read(reinterpret_cast<char*>(bytes.data()), 4);
-  const std::int64_t count = bytes[0] + 256LL * bytes[1] + 65536LL * bytes[2] + 16777216LL * bytes[3];
-  if (84 + 50 * count != size) return std::nullopt;
-  return count;
+/// No triangle of a 3MF model takes fewer bytes than `<triangle v1="0" v2="1" v3="2"/>`, and half a vertex.
+std::int64_t Count3mf(const fs::path& file) {
+  constexpr std::int64_t kLeastBytes = 50;
+  const std::optional<ZipModel> model = PeekZipModel(file);
+  return model ? static_cast<std::int64_t>(model->bytes) / kLeastBytes : 0;
 }
 
 void RequireModest(const fs::path& file, const std::string& extension) {
   std::int64_t triangles = 0;
   if (extension == ".stl") {
-    const auto binary = BinaryStlTriangles(file);
-    triangles = binary ? *binary : CountLines(file, "facet");
+    triangles = CountStl(file, kMostTriangles);
   } else if (extension == ".obj") {
-    triangles = CountLines(file, "f");
+    triangles = CountObj(file, kMostTriangles);
+  } else if (extension == ".ply") {
+    triangles = CountPly(file);
   } else {
-    std::error_code error;
-    triangles = static_cast<std::int64_t>(fs::file_size(file, error)) / 12;  // three indices of four bytes at the least
-    if (error || triangles < 40 * kMostTriangles) return;
+    triangles = Count3mf(file) / 2;  // they may take twice as many
   }
   if (triangles > kMostTriangles) TooMany(file, triangles);
-}
-
-float FloatAt(const char* bytes) {
-  float value = 0;
-  std::memcpy(&value, bytes, sizeof value);
-  return value;
-}
-
-RawPart ReadBinaryStl(const fs::path& file, std::int64_t triangles) {
-  std::ifstream in(file, std::ios::binary);
-  in.seekg(84);
-  RawBody body{file.stem().string(), {}};
-  std::array<char, 50> facet{};
-  for (std::int64_t t = 0; t < triangles && in.read(facet.data(), facet.size()); ++t) {
-    std::array<int, 3> corners{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const char* at = facet.data() + 12 + 12 * k;
-      corners[k] = static_cast<int>(body.mesh.points.size());
-      body.mesh.points.emplace_back(FloatAt(at), FloatAt(at + 4), FloatAt(at + 8));
-    }
-    body.mesh.triangles.push_back(corners);
-  }
-  return {"STL, binary", {std::move(body)}, std::nullopt};
-}
-
-/// The next number of a line; false at its end. Locales play no part.
-bool NextNumber(std::string_view& rest, double& value) {
-  const std::size_t begin = rest.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return false;
-  rest.remove_prefix(begin + (rest[begin] == '+' ? 1 : 0));
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
-  if (error != std::errc()) return false;
-  rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
-  return true;
-}
-
-RawPart ReadAsciiStl(const fs::path& file) {
-  std::ifstream in(file);
-  RawBody body{file.stem().string(), {}};
-  int number = 0;
-  int corners = 0;
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    const std::size_t begin = line.find_first_not_of(" \t");
-    if (begin == std::string::npos) continue;
-    if (line.compare(begin, 6, "vertex") == 0) {
-      std::string_view rest(line);
-      rest.remove_prefix(begin + 6);
-      Eigen::Vector3d p;
-      for (int k = 0; k < 3; ++k) {
-        if (!NextNumber(rest, p[k])) {
-          throw InputError(fmt::format("{}:{}", file.string(), number), "a vertex has not three numbers",
-                           "export it again");
-        }
-      }
-      body.mesh.points.push_back(p);
-      ++corners;
-    } else if (line.compare(begin, 7, "endloop") == 0) {
-      if (corners != 3) {
-        throw InputError(fmt::format("{}:{}", file.string(), number), fmt::format("a facet of {} corners", corners),
-                         "export triangles");
-      }
-      const int last = static_cast<int>(body.mesh.points.size());
-      body.mesh.triangles.push_back({last - 3, last - 2, last - 1});
-      corners = 0;
-    }
-  }
-  return {"STL, ascii", {std::move(body)}, std::nullopt};
-}
-
-/// OBJ: every face of every group and object, polygons as fans (assimp triangulates those that are not convex, but its
-/// reader drops faces of degenerate groups; the format is a page long).
-RawPart ReadObj(const fs::path& file) {
-  std::ifstream in(file);
-  std::vector<Eigen::Vector3d> points;
-  RawPart part{"OBJ", {}, std::nullopt};
-  std::string name = file.stem().string();
-  int number = 0;
-  RawBody body{name, {}};
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    const auto fail = [&](const std::string& what) {
-      throw InputError(fmt::format("{}:{}", file.string(), number), what, "export it again");
-    };
-    std::string_view rest(line);
-    if (rest.starts_with("v ")) {
-      rest.remove_prefix(2);
-      Eigen::Vector3d p;
-      for (int k = 0; k < 3; ++k) {
-        if (!NextNumber(rest, p[k])) fail("a vertex has not three numbers");
-      }
-      points.push_back(p);
-    } else if (rest.starts_with("f ")) {
-      rest.remove_prefix(2);
-      std::vector<int> face;
-      double value = 0;
-      while (NextNumber(rest, value)) {
-        const int index = static_cast<int>(value < 0 ? static_cast<double>(points.size()) + value : value - 1);
-        if (index < 0 || index >= static_cast<int>(points.size())) fail(fmt::format("a face names vertex {}", value));
-        face.push_back(index);
-        const std::size_t space = rest.find_first_of(" \t");
-        rest.remove_prefix(space == std::string_view::npos ? rest.size() : space);
-      }
-      if (face.size() < 3) fail("a face of fewer than three corners");
-      for (std::size_t k = 1; k + 1 < face.size(); ++k) body.mesh.triangles.push_back({face[0], face[k], face[k + 1]});
-    }
-  }
-  body.mesh.points = std::move(points);
-  part.bodies.push_back(std::move(body));
-  return part;
 }
 
 RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
@@ -194,7 +70,7 @@ RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
   RawPart part{format, {}, std::nullopt};
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
     const aiMesh& mesh = *scene->mMeshes[m];
-    RawBody body{mesh.mName.length > 0 ? mesh.mName.C_Str() : fmt::format("body {}", m + 1), {}};
+    RawBody body{mesh.mName.length > 0 ? mesh.mName.C_Str() : fmt::format("body {}", m + 1), {}, {}};
     for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
       const aiVector3D& p = mesh.mVertices[v];
       body.mesh.points.emplace_back(p.x, p.y, p.z);
@@ -219,25 +95,36 @@ RawPart ReadAll(const fs::path& file, const StepReader& step) {
   }
   RequireModest(file, extension);
   if (extension == ".obj") return ReadObj(file);
-  if (extension == ".stl") {
-    const auto binary = BinaryStlTriangles(file);
-    return binary ? ReadBinaryStl(file, *binary) : ReadAsciiStl(file);
-  }
+  if (extension == ".stl") return ReadStl(file);
   RawPart part = ReadWithAssimp(file, extension == ".ply" ? "PLY" : "3MF");
-  if (extension == ".3mf") part.unit = ParseUnit("mm");  // what the format means where it does not say another
+  if (extension == ".3mf") {
+    part.unit = ParseUnit("mm");  // what the format means where it does not say another
+    const std::optional<ZipModel> model = PeekZipModel(file);
+    if (const auto unit = model ? UnitOfModel(model->head) : std::nullopt) {
+      part.unit = Unit{unit->name, unit->metres};
+      part.unit_is_stated = true;
+    }
+  }
   return part;
 }
 
 void KeepBody(const PartSource& source, RawPart& part) {
   if (source.body.empty()) return;
+  std::vector<RawBody> kept;
+  for (const RawBody& body : part.bodies) {
+    if (body.name == source.body || body.group == source.body) kept.push_back(body);
+  }
   std::string names;
   for (std::size_t i = 0; i < part.bodies.size(); ++i) {
     const RawBody& body = part.bodies[i];
-    if (body.name == source.body || std::to_string(i + 1) == source.body) {
-      part.bodies = {RawBody(body)};
-      return;
-    }
-    names += fmt::format("{}{} \"{}\"", i == 0 ? "" : ", ", i + 1, body.name);
+    if (kept.empty() && std::to_string(i + 1) == source.body) kept.push_back(body);
+    const bool grouped = !body.group.empty() && body.group != body.name;
+    names += fmt::format("{}{} \"{}\"{}", i == 0 ? "" : ", ", i + 1, body.name,
+                         grouped ? fmt::format(" (group \"{}\")", body.group) : "");
+  }
+  if (!kept.empty()) {
+    part.bodies = std::move(kept);
+    return;
   }
   throw InputError(source.file.string(), fmt::format("has no body \"{}\"", source.body), "it has " + names);
 }

@@ -23,13 +23,16 @@ Unit ParseUnit(const std::string& name);
 struct RawBody {
   std::string name;
   TriangleMesh mesh;
+  std::string group = {};  ///< of an OBJ file, within its object; else empty
 };
 
 /// What a file holds.
 struct RawPart {
   std::string format;           ///< "OBJ", "STEP" ...
   std::vector<RawBody> bodies;  ///< in the order of the file
-  std::optional<Unit> unit;     ///< if the file says so
+  std::optional<Unit> unit;     ///< if the file, or its format, says so
+  bool unit_is_stated = false;  ///< by the file itself: nothing else holds
+  std::vector<std::string> notes = {};  ///< what was left out, a sentence each
 };
 
 /// More triangles than this are refused: what a part needs is a hundredth.
@@ -38,7 +41,8 @@ constexpr std::int64_t kMostTriangles = 1'000'000;
 /// Reads a STEP file as triangles (cad/step/).
 using StepReader = std::function<RawPart(const std::filesystem::path&)>;
 
-/// A file, and which of its bodies: "part.step", "part.step#2" (the second), "part.step#housing" (by its name).
+/// A file, and which of its bodies: "part.step", "part.step#2" (the second), "part.step#housing" (by its name, in OBJ
+/// that of an object or of a group).
 struct PartSource {
   std::filesystem::path file;
   std::string body;  ///< empty: all
@@ -46,7 +50,7 @@ struct PartSource {
 PartSource ParseSource(const std::string& text);
 
 /// Reads STL (ascii and binary), OBJ (all groups and objects), PLY and 3MF, and STEP by way of `step`. Throws
-/// InputError for a file that is not there, is of another kind, holds no triangles or too many.
+/// InputError for a file that is not there, is of another kind, empty or cut short, holds no triangles or too many.
 RawPart ReadPart(const PartSource& source, const StepReader& step);
 
 /// The unit of a part of this size in raw units, where the file does not say: metres up to 1, else millimetres. A

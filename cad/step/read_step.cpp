@@ -8,6 +8,12 @@
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepMesh_MeshAlgoFactory.hxx>
 #include <BRep_Tool.hxx>
+#include <IMeshData_Edge.hxx>
+#include <IMeshData_Face.hxx>
+#include <IMeshData_PCurve.hxx>
+#include <IMeshData_Wire.hxx>
+#include <IMeshTools_MeshAlgo.hxx>
+#include <IMeshTools_MeshAlgoFactory.hxx>
 #include <IMeshTools_ModelAlgo.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
@@ -23,6 +29,7 @@
 #include <TransferBRep.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
+#include <cmath>
 
 #include "feeler/core/error.h"
 
@@ -55,15 +62,46 @@ TriangleMesh MeshOf(const TopoDS_Shape& solid) {
 }
 
 /// Straight lines run along planes, cylinders and cones from edge to edge: points within them add nothing to how near
-/// they are met, and Open CASCADE's grid on a cone is a hundred slabs to cut (cad/section).
-class NoPointsInside : public BRepMesh_MeshAlgoFactory {
+/// they are met, and Open CASCADE's grid on a cone is a hundred slabs to cut (cad/section). That holds of faces whose
+/// edges run along or around; where an edge is slanting (a bore that leans against its face), triangles from edge to
+/// edge would cut through the hollow.
+class NoPointsInside : public IMeshTools_MeshAlgo {
  public:
-  Handle(IMeshTools_MeshAlgo)
-      GetAlgo(const GeomAbs_SurfaceType type, const IMeshTools_Parameters& parameters) const override {
-    if (type == GeomAbs_Plane || type == GeomAbs_Cylinder || type == GeomAbs_Cone) {
-      return new BRepMesh_DelaunayBaseMeshAlgo;
+  void Perform(const IMeshData::IFaceHandle& face, const IMeshTools_Parameters& parameters,
+               const Message_ProgressRange& range) override {
+    const GeomAbs_SurfaceType type = face->GetSurface()->GetType();
+    const bool straight = type == GeomAbs_Plane || ((type == GeomAbs_Cylinder || type == GeomAbs_Cone) && IsGrid(face));
+    const Handle(IMeshTools_MeshAlgo) algorithm = straight ? Handle(IMeshTools_MeshAlgo)(new BRepMesh_DelaunayBaseMeshAlgo)
+                                                           : BRepMesh_MeshAlgoFactory().GetAlgo(type, parameters);
+    if (!algorithm.IsNull()) algorithm->Perform(face, parameters, range);
+  }
+
+ private:
+  /// Whether each edge runs along one of the parameters of the surface.
+  static bool IsGrid(const IMeshData::IFaceHandle& face) {
+    constexpr double kSame = 1e-6;
+    for (int w = 0; w < face->WiresNb(); ++w) {
+      const IMeshData::IWireHandle& wire = face->GetWire(w);
+      for (int e = 0; e < wire->EdgesNb(); ++e) {
+        const IMeshData::IPCurveHandle& curve = wire->GetEdge(e)->GetPCurve(face.get(), wire->GetEdgeOrientation(e));
+        bool along = true;
+        bool around = true;
+        for (int i = 1; i < curve->ParametersNb(); ++i) {
+          along = along && std::abs(curve->GetPoint(i).X() - curve->GetPoint(0).X()) < kSame;
+          around = around && std::abs(curve->GetPoint(i).Y() - curve->GetPoint(0).Y()) < kSame;
+        }
+        if (!along && !around) return false;
+      }
     }
-    return BRepMesh_MeshAlgoFactory::GetAlgo(type, parameters);
+    return true;
+  }
+};
+
+class NoPointsInsideFactory : public IMeshTools_MeshAlgoFactory {
+ public:
+  Handle(IMeshTools_MeshAlgo) GetAlgo(const GeomAbs_SurfaceType /*type*/,
+                                      const IMeshTools_Parameters& /*parameters*/) const override {
+    return new NoPointsInside;
   }
 };
 
@@ -81,7 +119,7 @@ class NoPointsOnSeams : public IMeshTools_ModelAlgo {
 void Triangulate(const TopoDS_Shape& shape, double deflection_mm, double angle_rad) {
   const Handle(BRepMesh_Context) context = new BRepMesh_Context;
   context->SetPreProcessor(new NoPointsOnSeams);
-  context->SetFaceDiscret(new BRepMesh_FaceDiscret(new NoPointsInside));
+  context->SetFaceDiscret(new BRepMesh_FaceDiscret(new NoPointsInsideFactory));
   BRepMesh_IncrementalMesh mesh;
   mesh.SetShape(shape);
   mesh.ChangeParameters().Deflection = deflection_mm;
@@ -110,9 +148,9 @@ RawPart ReadStep(const std::filesystem::path& file, double deflection_mm, double
     const TopoDS_Shape shape = reader.OneShape();
     if (shape.IsNull()) throw InputError(file.string(), "holds no shape", "export a solid");
     Triangulate(shape, deflection_mm, angle_rad);
-    RawPart part{"STEP", {}, ParseUnit("mm")};  // the reader converts
+    RawPart part{"STEP", {}, ParseUnit("mm"), true, {}};  // the reader converts
     for (TopExp_Explorer solids(shape, TopAbs_SOLID); solids.More(); solids.Next()) {
-      RawBody body{NameOf(reader, solids.Current()), MeshOf(solids.Current())};
+      RawBody body{NameOf(reader, solids.Current()), MeshOf(solids.Current()), {}};
       if (body.name.empty()) body.name = fmt::format("solid {}", part.bodies.size() + 1);
       part.bodies.push_back(std::move(body));
     }

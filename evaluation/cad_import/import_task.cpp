@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -57,8 +56,7 @@ ImportedPart ReadAndCheck(const std::string& source_text, const std::string& rol
   part.hash = HashOf(source.file);
   part.format = raw.format;
   const cad::UnitGuess guess = cad::GuessUnit(raw);
-  // A STEP file always says; of a 3MF file the unit is not read.
-  const bool given = !options.unit.empty() && raw.format != "STEP";
+  const bool given = !options.unit.empty() && !raw.unit_is_stated;
   const cad::Unit unit = given ? cad::ParseUnit(options.unit) : guess.unit;
   part.unit = unit.name;
   part.unit_reason = given ? "given (--unit)" : guess.reason;
@@ -70,6 +68,7 @@ ImportedPart ReadAndCheck(const std::string& source_text, const std::string& rol
                      "say the unit: --unit mm, cm, m, in or um");
   }
   part.checked = cad::CheckPart(mesh, where);
+  for (const std::string& note : raw.notes) part.checked.noted.push_back(note);
   return part;
 }
 
@@ -116,6 +115,20 @@ std::size_t BoreFacets(const cad::Mating& mating) {
   return facets;
 }
 
+/// Domes and fillets have more corners than contact needs: those go that leave the surface where it is within what is
+/// left of the deviation that is allowed.
+void FewerCorners(const cad::Mating& mating, double budget, ImportedPart& part) {
+  constexpr std::size_t kMany = 128;
+  constexpr double kFar_m = 2e-5;
+  const double near_m = std::clamp(0.9 * (budget - part.tolerance_near_m), 1e-7, 0.4 * budget);
+  const auto tolerance_at = [&](const Eigen::Vector3d& p) {
+    return mating.mating_box.contains(p) ? near_m : std::max(kFar_m, near_m);
+  };
+  for (cad::ConvexPiece& piece : part.pieces) {
+    if (piece.surface.points.size() > kMany) piece = cad::WithFewerCorners(piece, tolerance_at);
+  }
+}
+
 /// Cuts a part into pieces, exactly if that takes few, else within larger and larger tolerances.
 void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::string& role,
                 const ImportOptions& options, ImportedPart& part) {
@@ -134,25 +147,33 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
   for (const auto& [share, far_m] : {std::pair{0.2, 1e-5}, {0.5, 5e-5}, {0.7, 1e-4}, {0.9, 2e-4}, {0.9, 4e-4}}) {
     ladder.push_back({std::max(1e-6, share * budget), std::max(1e-6, far_m)});
   }
+  bool found = false;
   for (const Tolerances& step : ladder) {
     cad::DecomposeOptions decompose;
     decompose.mating = mating.mating_box;
     decompose.tolerance_near_m = step.near_m;
     decompose.tolerance_far_m = step.far_m;
     // Slices of so many bodies seldom unite to few enough, and it takes long to see that.
-    const std::size_t most_bodies =
-        &step == &ladder.back() ? std::numeric_limits<std::size_t>::max() : kMostBodies * most;
+    const std::size_t most_bodies = kMostBodies * (&step == &ladder.back() ? kMostPiecesOfBore : most);
+    const std::size_t most_pieces = &step == &ladder.back() ? most_bodies : most;
     part.pieces.clear();
     bool all = true;
     for (const cad::TriangleMesh& solid : part.checked.solids) {
-      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies);
+      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies, most_pieces);
       all = pieces.has_value();
       if (!all) break;
       for (cad::ConvexPiece& piece : *pieces) part.pieces.push_back(std::move(piece));
     }
     part.tolerance_near_m = step.near_m;
     part.tolerance_far_m = step.far_m;
+    found = all;
     if (all && part.pieces.size() <= most) break;
+  }
+  FewerCorners(mating, budget, part);
+  if (!found) {
+    throw InputError(fmt::format("{} ({})", role, part.file),
+                     fmt::format("needs more than {} convex pieces", kMostPiecesOfBore),
+                     "leave out what does not mate: threads, engravings, small fillets");
   }
   if (part.pieces.empty()) throw InputError(role, "no convex piece has a volume", "is the part thinner than 2 um?");
   if (part.pieces.size() > kMostPiecesOfBore) {

@@ -548,8 +548,8 @@ std::vector<PartKind> PartKinds() {
           {"keyed-shaft", 0.1, 0.1, 12.0}, {"keyed-gear", 0.1, 0.1, 18.0, true},
           {"ring-gear", 0.0, 0.0, 10.0},   {"hexagon", 0.1, 0.1, 11.0},
           {"round-pins", 0.15, 0.15, 12.0}, {"ellipse", 0.15, 0.15, 10.0},
-          {"domed", 0.12, 0.12, 15.0},     {"filleted", 0.12, 0.12, 12.0},
-          {"filleted-bore", 0.1, 0.1, 12.0}, {"oblique-bore", 0.1, 0.1, 0.0}, {"oblique-slot", 0.15, 0.15, 0.0}};
+          {"domed", 0.12, 0.12, 15.0, false, false, true}, {"filleted", 0.12, 0.12, 12.0, false, false, true},
+          {"filleted-bore", 0.1, 0.1, 12.0, false, false, true}, {"oblique-bore", 0.1, 0.1, 0.0}, {"oblique-slot", 0.15, 0.15, 0.0}};
 }
 
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format,

@@ -17,6 +17,7 @@ struct PartKind {
   double depth_mm = 0.0;  ///< from mouth to fully in; 0: not asserted
   bool tool_has_opening = false;
   bool assembled = false;  ///< both stand as assembled
+  bool fine = false;       ///< of thousands of triangles
 };
 
 /// The kinds that can be drawn.
