@@ -249,7 +249,7 @@ TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
             MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
         EXPECT_NEAR(1000 * mating.clearance_m.minCoeff(), std::min(kind.clearance_x_mm, kind.clearance_y_mm), 0.01)
             << where;
-        if (kind.depth_mm > 0) EXPECT_NEAR(1000 * mating.depth_m, kind.depth_mm, 0.01) << where;
+        EXPECT_NEAR(1000 * mating.depth_m, kind.depth_mm > 0 ? kind.depth_mm : 1000 * mating.depth_m, 0.01) << where;
         EXPECT_EQ(mating.tool_has_opening, kind.tool_has_opening) << where;
         EXPECT_FALSE(mating.openings.empty()) << where;
       }) << where;
