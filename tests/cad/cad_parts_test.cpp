@@ -251,7 +251,7 @@ TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
             << where;
         EXPECT_NEAR(1000 * mating.depth_m, kind.depth_mm > 0 ? kind.depth_mm : 1000 * mating.depth_m, 0.01) << where;
         EXPECT_EQ(mating.tool_has_opening, kind.tool_has_opening) << where;
-        EXPECT_FALSE(mating.openings.empty()) << where;
+        EXPECT_EQ(mating.openings.empty(), kind.depth_mm == 0) << where;  // a slanting rim has no line at one height
       }) << where;
     }
   }
