@@ -116,12 +116,12 @@ std::string InMillimetres(const Eigen::Vector3d& p) {
 [[noreturn]] void NoFit(const Miss& miss, bool tried) {
   constexpr double kNone_m = 1e-6;
   if (miss.too_wide_m < kNone_m) {
-    throw InputError("tool and target",
-                     fmt::format("have no clearance: {:.4f} x {:.4f} mm goes into a hole of {:.4f} x {:.4f} mm",
-                                 1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(),
-                                 1000 * miss.hole.y()),
-                     "a fit without play cannot be simulated with rigid parts: make the hole larger by what the parts "
-                     "have in truth");
+    throw InputError(
+        "tool and target",
+        fmt::format("have no clearance: {:.4f} x {:.4f} mm goes into a hole of {:.4f} x {:.4f} mm",
+                    1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(), 1000 * miss.hole.y()),
+        "a fit without play cannot be simulated with rigid parts: make the hole larger by what the parts "
+        "have in truth");
   }
   if (tried) {
     throw InputError("tool and target",

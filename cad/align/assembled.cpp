@@ -46,10 +46,11 @@ std::optional<double> TiltOf(const TriangleMesh& tool, const TriangleMesh& targe
 void RequireUpright(const TriangleMesh& tool, const TriangleMesh& target, const Eigen::Vector3d& way_in) {
   const double tilt = TiltOf(tool, target, way_in).value_or(0.0);
   if (tilt < kLeastTilt_rad) return;
-  throw InputError("tool and target",
-                   fmt::format("as they are placed the tool leans by {:.2f} degrees against the hole, {:.3f} mm in 10 mm",
-                               tilt / kDegree, 10 * std::tan(tilt)),
-                   "place them upright, or leave the placement out: how they go together is found, too");
+  throw InputError(
+      "tool and target",
+      fmt::format("as they are placed the tool leans by {:.2f} degrees against the hole, {:.3f} mm in 10 mm",
+                  tilt / kDegree, 10 * std::tan(tilt)),
+      "place them upright, or leave the placement out: how they go together is found, too");
 }
 
 struct Way {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSameDirection = 0.99996;  // cosine of half a degree
 constexpr std::size_t kMostNormals = 8;
-constexpr double kLeastShare = 0.02;  ///< of the surface, or of its edges, for a direction to count
+constexpr double kLeastShare = 0.02;      ///< of the surface, or of its edges, for a direction to count
 constexpr double kExactly = 0.999999875;  ///< cosine of what a file of six digits leaves open, 5e-4
 constexpr double kBend = 0.01;            ///< sine of the angle at an edge, from which on it is one
 constexpr std::size_t kMostSlabs = 24;
@@ -64,9 +64,8 @@ std::vector<Direction> Gathered(std::vector<Direction> all, double same, int lea
   std::vector<Direction> groups;
   std::vector<int> counts;
   for (const Direction& one : all) {
-    const auto known = std::find_if(groups.begin(), groups.end(), [&](const Direction& group) {
-      return std::abs(group.unit.dot(one.unit)) >= same;
-    });
+    const auto known = std::find_if(groups.begin(), groups.end(),
+                                    [&](const Direction& group) { return std::abs(group.unit.dot(one.unit)) >= same; });
     if (known != groups.end()) {
       known->weight += one.weight;
       ++counts[static_cast<std::size_t>(known - groups.begin())];
@@ -118,17 +117,16 @@ std::vector<Direction> BentEdgesOf(const TriangleMesh& mesh) {
       uses.push_back({{std::min(i, j), std::max(i, j)}, t});
     }
   }
-  std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) {
-    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
-  });
+  std::sort(uses.begin(), uses.end(),
+            [](const Use& a, const Use& b) { return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle; });
   std::vector<Direction> edges;
   for (std::size_t i = 0; i + 1 < uses.size(); ++i) {
     if (uses[i].edge != uses[i + 1].edge) continue;
     const Eigen::Vector3d a = AreaVector(mesh, uses[i].triangle);
     const Eigen::Vector3d b = AreaVector(mesh, uses[i + 1].triangle);
     if (a.cross(b).norm() <= kBend * a.norm() * b.norm()) continue;
-    const Eigen::Vector3d along = mesh.points[static_cast<std::size_t>(uses[i].edge[1])] -
-                                  mesh.points[static_cast<std::size_t>(uses[i].edge[0])];
+    const Eigen::Vector3d along =
+        mesh.points[static_cast<std::size_t>(uses[i].edge[1])] - mesh.points[static_cast<std::size_t>(uses[i].edge[0])];
     const double length = along.norm();
     if (length > 1e-6) edges.push_back({along / length, length});
   }
@@ -167,7 +165,8 @@ std::vector<Eigen::Vector3d> CandidateDirections(const TriangleMesh& mesh) {
     directions.push_back(-unit);
   }
   for (const Eigen::Vector3d& d : shape) {
-    if (std::any_of(directions.begin(), directions.end(), [&](const auto& known) { return known.dot(d) > kSameDirection; }))
+    if (std::any_of(directions.begin(), directions.end(),
+                    [&](const auto& known) { return known.dot(d) > kSameDirection; }))
       continue;
     directions.push_back(d);
     directions.push_back(-d);

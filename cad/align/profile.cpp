@@ -166,8 +166,9 @@ std::vector<double> TurnsInto(const Profile& inner, const Profile& outer, std::s
   std::vector<double> turns;
   for (const std::size_t k : order) {
     const double turn = 2 * std::numbers::pi * static_cast<double>(k) / kBins;
-    const bool known = std::any_of(turns.begin(), turns.end(),
-                                   [&](double t) { return std::abs(Centred(turn - t, 2 * std::numbers::pi)) < kApart_rad; });
+    const bool known = std::any_of(turns.begin(), turns.end(), [&](double t) {
+      return std::abs(Centred(turn - t, 2 * std::numbers::pi)) < kApart_rad;
+    });
     if (!known) turns.push_back(turn);
     if (turns.size() == most) break;
   }

@@ -204,8 +204,8 @@ class Pairing {
     return rolls;
   }
 
-  void Add(const Match& match, const Outlines& outlines, const Turn& turn,
-           std::optional<double>& round_room, std::vector<Trial>& trials, Miss& miss) const {
+  void Add(const Match& match, const Outlines& outlines, const Turn& turn, std::optional<double>& round_room,
+           std::vector<Trial>& trials, Miss& miss) const {
     const Feature& f = *match.tool;
     const Feature& g = *match.target;
     const double roll = turn.roll_rad;

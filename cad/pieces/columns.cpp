@@ -36,10 +36,9 @@ bool LiesWithin(const SlabLoop& inner, const SlabLoop& outer, double slack_m) {
   const Eigen::AlignedBox2d b = BoundsOf(outer);
   if ((a.min().array() < b.min().array() - slack_m).any() || (a.max().array() > b.max().array() + slack_m).any())
     return false;
-  return std::all_of(inner.begin(), inner.end(),
-                     [&](const SlabPoint& p) {
-                       return Encloses(outer, p.middle) || OffLine(outer, p.middle) <= slack_m;
-                     }) &&
+  return std::all_of(
+             inner.begin(), inner.end(),
+             [&](const SlabPoint& p) { return Encloses(outer, p.middle) || OffLine(outer, p.middle) <= slack_m; }) &&
          std::all_of(outer.begin(), outer.end(), [&](const SlabPoint& p) {
            return !Encloses(inner, p.middle) || OffLine(inner, p.middle) <= slack_m;
          });
@@ -205,7 +204,8 @@ class Stacker {
         ++first;
         continue;
       }
-      for (const SlabLoop& polygon : ConvexPartition(envelope.loops(), slack_m, false).value_or(std::vector<SlabLoop>{})) {
+      for (const SlabLoop& polygon :
+           ConvexPartition(envelope.loops(), slack_m, false).value_or(std::vector<SlabLoop>{})) {
         Cell cell;
         for (const SlabPoint& p : polygon) cell.push_back(p.middle);
         Stack(cell, first, last - 1, kHalvings);

@@ -16,10 +16,10 @@ struct DecomposeOptions {
   int most_slabs = 160;            ///< beyond it, slabs of a free form are drawn together
 };
 
-/// A solid as convex bodies whose union is the solid. One that is convex is one body; else the part is sliced along z at the heights of its corners, each
-/// slice is cut into convex polygons (cad/section/convex_partition.h), and the bodies over them are united as long as
-/// the convex hull of two stays in the solid, within the tolerances. Exact for prisms, bores, tapers and rings along z.
-/// Same input, same pieces, bit for bit.
+/// A solid as convex bodies whose union is the solid. One that is convex is one body; else the part is sliced along z
+/// at the heights of its corners, each slice is cut into convex polygons (cad/section/convex_partition.h), and the
+/// bodies over them are united as long as the convex hull of two stays in the solid, within the tolerances. Exact for
+/// prisms, bores, tapers and rings along z. Same input, same pieces, bit for bit.
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options);
 /// The same, or in columns (columns.h) where the slices have more than `most_bodies` before they are united, or more
 /// than `most_pieces` are left; nothing where that many are left of the columns, too.

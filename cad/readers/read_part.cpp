@@ -35,7 +35,8 @@ std::int64_t CountPly(const fs::path& file) {
     const std::string_view word = NextWord(rest);
     double count = 0;
     if (word == "end_header") break;
-    if (word == "element" && NextWord(rest) == "face" && NextNumber(rest, count)) return static_cast<std::int64_t>(count);
+    if (word == "element" && NextWord(rest) == "face" && NextNumber(rest, count))
+      return static_cast<std::int64_t>(count);
   }
   return 0;
 }

@@ -28,10 +28,10 @@ struct RawBody {
 
 /// What a file holds.
 struct RawPart {
-  std::string format;           ///< "OBJ", "STEP" ...
-  std::vector<RawBody> bodies;  ///< in the order of the file
-  std::optional<Unit> unit;     ///< if the file, or its format, says so
-  bool unit_is_stated = false;  ///< by the file itself: nothing else holds
+  std::string format;                   ///< "OBJ", "STEP" ...
+  std::vector<RawBody> bodies;          ///< in the order of the file
+  std::optional<Unit> unit;             ///< if the file, or its format, says so
+  bool unit_is_stated = false;          ///< by the file itself: nothing else holds
   std::vector<std::string> notes = {};  ///< what was left out, a sentence each
 };
 

@@ -58,10 +58,10 @@ StlKind KindOf(const std::filesystem::path& file) {
                      "it was cut short: export or copy it again");
   }
   if (kind.beyond < 0) {
-    throw InputError(file.string(),
-                     fmt::format("is a binary STL that was cut short: {} of its {} triangles are there", kind.there,
-                                 kind.counted),
-                     "export or copy it again");
+    throw InputError(
+        file.string(),
+        fmt::format("is a binary STL that was cut short: {} of its {} triangles are there", kind.there, kind.counted),
+        "export or copy it again");
   }
   return kind;
 }
@@ -88,8 +88,8 @@ RawPart ReadBinary(const std::filesystem::path& file, const StlKind& kind) {
   }
   RawPart part{"STL, binary", {std::move(body)}, std::nullopt};
   if (kind.beyond > 0) {
-    part.notes.push_back(fmt::format("{} bytes after the {} triangles that the header counts are left out", kind.beyond,
-                                     kind.counted));
+    part.notes.push_back(
+        fmt::format("{} bytes after the {} triangles that the header counts are left out", kind.beyond, kind.counted));
   }
   return part;
 }

@@ -80,8 +80,12 @@ std::optional<NamedLength> UnitOfModel(const std::string& head) {
   const std::size_t model = head.find("<model");
   if (model == std::string::npos) return std::nullopt;
   const std::string element = head.substr(model, head.find('>', model) - model);
-  for (const NamedLength& unit : {NamedLength{"micron", 1e-6}, {"millimeter", 1e-3}, {"centimeter", 1e-2},
-                                  {"inch", 0.0254}, {"foot", 0.3048}, {"meter", 1.0}}) {
+  for (const NamedLength& unit : {NamedLength{"micron", 1e-6},
+                                  {"millimeter", 1e-3},
+                                  {"centimeter", 1e-2},
+                                  {"inch", 0.0254},
+                                  {"foot", 0.3048},
+                                  {"meter", 1.0}}) {
     for (const char quote : {'"', '\''}) {
       if (element.find(" unit=" + (quote + unit.name) + quote) != std::string::npos) return unit;
     }

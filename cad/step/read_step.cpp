@@ -71,8 +71,9 @@ class NoPointsInside : public IMeshTools_MeshAlgo {
                const Message_ProgressRange& range) override {
     const GeomAbs_SurfaceType type = face->GetSurface()->GetType();
     const bool straight = type == GeomAbs_Plane || ((type == GeomAbs_Cylinder || type == GeomAbs_Cone) && IsGrid(face));
-    const Handle(IMeshTools_MeshAlgo) algorithm = straight ? Handle(IMeshTools_MeshAlgo)(new BRepMesh_DelaunayBaseMeshAlgo)
-                                                           : BRepMesh_MeshAlgoFactory().GetAlgo(type, parameters);
+    const Handle(IMeshTools_MeshAlgo) algorithm = straight
+                                                      ? Handle(IMeshTools_MeshAlgo)(new BRepMesh_DelaunayBaseMeshAlgo)
+                                                      : BRepMesh_MeshAlgoFactory().GetAlgo(type, parameters);
     if (!algorithm.IsNull()) algorithm->Perform(face, parameters, range);
   }
 
@@ -99,8 +100,8 @@ class NoPointsInside : public IMeshTools_MeshAlgo {
 
 class NoPointsInsideFactory : public IMeshTools_MeshAlgoFactory {
  public:
-  Handle(IMeshTools_MeshAlgo) GetAlgo(const GeomAbs_SurfaceType /*type*/,
-                                      const IMeshTools_Parameters& /*parameters*/) const override {
+  Handle(IMeshTools_MeshAlgo)
+      GetAlgo(const GeomAbs_SurfaceType /*type*/, const IMeshTools_Parameters& /*parameters*/) const override {
     return new NoPointsInside;
   }
 };

@@ -258,7 +258,8 @@ TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
 }
 
 TEST_F(CadParts, ATurnAboutTheWayInIsFound) {
-  for (const std::string kind : {"keyed-shaft", "keyed-gear", "ring-gear", "hexagon", "round-pins", "ellipse", "d-plug"}) {
+  for (const std::string kind :
+       {"keyed-shaft", "keyed-gear", "ring-gear", "hexagon", "round-pins", "ellipse", "d-plug"}) {
     std::vector<double> clearances_mm;
     for (const double degrees : {0.0, 27.0}) {
       const PartFiles files = WriteParts(kind, folder_, "stl", RolledBy(degrees));
@@ -269,7 +270,8 @@ TEST_F(CadParts, ATurnAboutTheWayInIsFound) {
         const Mating mating =
             MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
         clearances_mm.push_back(1000 * mating.clearance_m.minCoeff());
-      }) << kind << ' ' << degrees;
+      }) << kind
+         << ' ' << degrees;
     }
     EXPECT_NEAR(clearances_mm.front(), clearances_mm.back(), 0.01) << kind;
   }
@@ -306,8 +308,8 @@ TEST_F(CadParts, AnAssembledToolIsTakenToItsStopAndMayNotLean) {
   const auto moved = [&](double lift_m, double lean_deg) {
     const Eigen::Vector3d middle = BoundsOf(tool).center();
     const Eigen::AngleAxisd lean(lean_deg * std::numbers::pi / 180, Eigen::Vector3d::UnitX());
-    return Transformed(tool, MakePose(middle + lift_m * Eigen::Vector3d::UnitZ()) *
-                                 Pose(Eigen::Isometry3d(lean)) * MakePose(-middle));
+    return Transformed(
+        tool, MakePose(middle + lift_m * Eigen::Vector3d::UnitZ()) * Pose(Eigen::Isometry3d(lean)) * MakePose(-middle));
   };
   const Alignment alignment = AlignAssembled(moved(0.003, 0), target);
   EXPECT_THAT(alignment.notes, testing::Contains(testing::HasSubstr("stands 3.000 mm above what stops it")));
@@ -396,7 +398,8 @@ class Files : public CadParts {
   }
 };
 
-constexpr char kFacet[] = "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+constexpr char kFacet[] =
+    "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
 
 TEST_F(Files, OfAnStlTheCauseIsNamed) {
   std::string binary(84, '\0');
@@ -408,7 +411,8 @@ TEST_F(Files, OfAnStlTheCauseIsNamed) {
   EXPECT_THAT(Raw(Write("more.stl", binary + facet + facet + "xyz")).notes,
               testing::Contains(testing::HasSubstr("3 bytes after the 2 triangles")));
   EXPECT_THAT(MessageOf([&] { Raw(Write("empty.stl", "")); }), testing::HasSubstr("is empty"));
-  EXPECT_THAT(MessageOf([&] { Raw(Write("text.stl", "solid a\nendsolid\n")); }), testing::HasSubstr("without one facet"));
+  EXPECT_THAT(MessageOf([&] { Raw(Write("text.stl", "solid a\nendsolid\n")); }),
+              testing::HasSubstr("without one facet"));
   EXPECT_THAT(MessageOf([&] { Raw(Write("half.stl", "solid a\nfacet\nouter loop\nvertex 0 0 0\n")); }),
               testing::HasSubstr("within a facet"));
 }

@@ -255,9 +255,7 @@ Pair RingGear() {
   return {Teeth(12, 7, 9, 0, 40), Rod(0, 0, 18, -14, 0) - Teeth(12, 7 + c, 9 + c, -10, 1)};
 }
 
-Pair Hexagon() {
-  return {Prism(Regular(6, 10.0), 0, 45), Block(30, 26, -16, 0) - Prism(Regular(6, 10.2), -11, 1)};
-}
+Pair Hexagon() { return {Prism(Regular(6, 10.0), 0, 45), Block(30, 26, -16, 0) - Prism(Regular(6, 10.2), -11, 1)}; }
 
 /// Three round pins, each as every other.
 Pair RoundPins() {
@@ -312,9 +310,8 @@ Pair Filleted() {
   const double c = 0.12;
   const Shape peg = Rounded(Block(10, 8, 0, 45), 0.8, [](const gp_Pnt&) { return true; });
   const Shape block = Rounded(Block(34, 30, -18, 0), 2.0, [](const gp_Pnt& p) { return p.Z() > -17; });
-  const Shape hole = Rounded(Block(10 + 2 * c, 8 + 2 * c, -12, 5), 0.8, [](const gp_Pnt& p) {
-    return std::abs(p.X()) > 1 && std::abs(p.Y()) > 1;
-  });
+  const Shape hole = Rounded(Block(10 + 2 * c, 8 + 2 * c, -12, 5), 0.8,
+                             [](const gp_Pnt& p) { return std::abs(p.X()) > 1 && std::abs(p.Y()) > 1; });
   return {peg, Rounded(block - hole, 1.0, [](const gp_Pnt& p) {
             return std::abs(p.Z()) < 1e-6 && std::abs(p.X()) < 8 && std::abs(p.Y()) < 7;
           })};
@@ -323,9 +320,8 @@ Pair Filleted() {
 /// A bore with a rounded rim.
 Pair FilletedBore() {
   const Shape peg = Rounded(Rod(0, 0, 5, 0, 45), 1.0, [](const gp_Pnt& p) { return p.Z() < 1; });
-  return {peg, Rounded(Block(30, 30, -18, 0) - Rod(0, 0, 5.1, -12, 1), 1.0, [](const gp_Pnt& p) {
-            return std::abs(p.Z()) < 1e-6 && std::hypot(p.X(), p.Y()) < 6;
-          })};
+  return {peg, Rounded(Block(30, 30, -18, 0) - Rod(0, 0, 5.1, -12, 1), 1.0,
+                       [](const gp_Pnt& p) { return std::abs(p.Z()) < 1e-6 && std::hypot(p.X(), p.Y()) < 6; })};
 }
 
 Pair Draw(const std::string& kind) {
@@ -538,18 +534,31 @@ PartPlacement Anyhow(std::uint64_t seed) {
 }
 
 std::vector<PartKind> PartKinds() {
-  return {{"keyed", 0.15, 0.15, 12.0},    {"d-plug", 0.12, 0.12, 10.0},
-          {"usb-a", 0.2, 0.2, 12.0},      {"rj45", 0.13, 0.13, 14.0},
-          {"two-pin", 0.2, 0.2, 19.0},    {"three-pin", 0.2, 0.2, 22.0},
-          {"gear", 0.1, 0.1, 18.0, true}, {"hex-socket", 0.1, 0.1, 8.0, true},
-          {"taper", 0.0, 0.0, 0.0},       {"tilted", 0.1, 0.1, 9.0},
-          {"chamfered", 0.2, 0.2, 12.0},  {"chamfered-tee", 0.2, 0.2, 12.0},
-          {"shell", 0.2, 0.2, 11.9},      {"assembly", 0.15, 0.15, 12.0, false, true},
-          {"keyed-shaft", 0.1, 0.1, 12.0}, {"keyed-gear", 0.1, 0.1, 18.0, true},
-          {"ring-gear", 0.0, 0.0, 10.0},   {"hexagon", 0.1, 0.1, 11.0},
-          {"round-pins", 0.15, 0.15, 12.0}, {"ellipse", 0.15, 0.15, 10.0},
-          {"domed", 0.12, 0.12, 15.0, false, false, true}, {"filleted", 0.12, 0.12, 12.0, false, false, true},
-          {"filleted-bore", 0.1, 0.1, 12.0, false, false, true}, {"oblique-bore", 0.1, 0.1, 0.0}, {"oblique-slot", 0.15, 0.15, 0.0}};
+  return {{"keyed", 0.15, 0.15, 12.0},
+          {"d-plug", 0.12, 0.12, 10.0},
+          {"usb-a", 0.2, 0.2, 12.0},
+          {"rj45", 0.13, 0.13, 14.0},
+          {"two-pin", 0.2, 0.2, 19.0},
+          {"three-pin", 0.2, 0.2, 22.0},
+          {"gear", 0.1, 0.1, 18.0, true},
+          {"hex-socket", 0.1, 0.1, 8.0, true},
+          {"taper", 0.0, 0.0, 0.0},
+          {"tilted", 0.1, 0.1, 9.0},
+          {"chamfered", 0.2, 0.2, 12.0},
+          {"chamfered-tee", 0.2, 0.2, 12.0},
+          {"shell", 0.2, 0.2, 11.9},
+          {"assembly", 0.15, 0.15, 12.0, false, true},
+          {"keyed-shaft", 0.1, 0.1, 12.0},
+          {"keyed-gear", 0.1, 0.1, 18.0, true},
+          {"ring-gear", 0.0, 0.0, 10.0},
+          {"hexagon", 0.1, 0.1, 11.0},
+          {"round-pins", 0.15, 0.15, 12.0},
+          {"ellipse", 0.15, 0.15, 10.0},
+          {"domed", 0.12, 0.12, 15.0, false, false, true},
+          {"filleted", 0.12, 0.12, 12.0, false, false, true},
+          {"filleted-bore", 0.1, 0.1, 12.0, false, false, true},
+          {"oblique-bore", 0.1, 0.1, 0.0},
+          {"oblique-slot", 0.15, 0.15, 0.0}};
 }
 
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format,
