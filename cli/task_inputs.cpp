@@ -1,4 +1,4 @@
-#include "feeler/env/model/task_inputs.h"
+#include "feeler/env/model/task_xml.h"
 
 #include "feeler/cli/common/outputs.h"
 #include "feeler/core/error.h"

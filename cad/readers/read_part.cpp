@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "feeler/cad/readers/lines.h"
@@ -27,18 +28,28 @@ std::string Extension(const fs::path& file) { return Lower(file.extension().stri
                    "export it coarser: a part needs some thousands");
 }
 
-/// What the header of a PLY file says.
+/// The faces that the header of a PLY file speaks of. Throws InputError for more of anything than the file has bytes:
+/// no reader is to make room for them.
 std::int64_t CountPly(const fs::path& file) {
+  std::error_code unknown;
+  const auto bytes = static_cast<double>(fs::file_size(file, unknown));
   Lines lines(file);
+  std::int64_t faces = 0;
   for (std::string line; lines.Next(line) && lines.number() < 1000;) {
     std::string_view rest(line);
     const std::string_view word = NextWord(rest);
-    double count = 0;
     if (word == "end_header") break;
-    if (word == "element" && NextWord(rest) == "face" && NextNumber(rest, count))
-      return static_cast<std::int64_t>(count);
+    if (word != "element") continue;
+    const std::string name(NextWord(rest));
+    double count = 0;
+    if (!NextNumber(rest, count) || !(count >= 0) || (!unknown && count > bytes)) {
+      throw InputError(fmt::format("{}: line {}", file.string(), lines.number()),
+                       fmt::format("the header speaks of more elements \"{}\" than the file has bytes", name),
+                       "export it again");
+    }
+    if (name == "face") faces = static_cast<std::int64_t>(count);
   }
-  return 0;
+  return faces;
 }
 
 /// No triangle of a 3MF model takes fewer bytes than `<triangle v1="0" v2="1" v3="2"/>`, and half a vertex.

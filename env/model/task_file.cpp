@@ -18,7 +18,6 @@
 #include "feeler/env/model/overlap_judge.h"
 #include "feeler/env/model/read_task.h"
 #include "feeler/env/model/task_fields.h"
-#include "feeler/env/model/task_inputs.h"
 #include "feeler/env/model/task_xml.h"
 
 namespace feeler::env {

@@ -12,7 +12,6 @@
 
 #include "feeler/core/error.h"
 #include "feeler/env/mjcf/mjcf_numbers.h"
-#include "feeler/env/model/task_inputs.h"
 
 namespace feeler::env {
 namespace {

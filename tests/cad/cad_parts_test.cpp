@@ -417,6 +417,22 @@ TEST_F(Files, OfAnStlTheCauseIsNamed) {
               testing::HasSubstr("within a facet"));
 }
 
+// No reader makes room for what a header promises and no file holds.
+TEST_F(Files, APlyHoldsWhatItsHeaderSpeaksOf) {
+  const auto ply = [](const std::string& vertices, const std::string& faces) {
+    return "ply\nformat ascii 1.0\nelement vertex " + vertices +
+           "\nproperty float x\nproperty float y\nproperty float z\nelement face " + faces +
+           "\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  };
+  EXPECT_EQ(Raw(Write("sound.ply", ply("3", "1"))).bodies.front().mesh.size(), 1);
+  for (const std::string many : {"4294967295", "999999999999", "1e308", "-1", "many", ""}) {
+    EXPECT_THAT(MessageOf([&] { Raw(Write("bad.ply", ply(many, "1"))); }),
+                testing::HasSubstr("bad.ply: line 3: the header speaks of more elements \"vertex\""))
+        << many;
+    EXPECT_THAT(MessageOf([&] { Raw(Write("bad.ply", ply("3", many))); }), testing::HasSubstr("line 7")) << many;
+  }
+}
+
 TEST_F(Files, AsciiStlIsReadHoweverItIsWritten) {
   std::string shouted = std::string("solid a\n") + kFacet + "endsolid a\nsolid b\n" + kFacet + kFacet + "endsolid b\n";
   for (char& c : shouted) c = static_cast<char>(std::toupper(c));
