@@ -1,7 +1,6 @@
-#include "feeler/env/model/task_xml.h"
-
 #include "feeler/cli/common/outputs.h"
 #include "feeler/core/error.h"
+#include "feeler/env/model/task_xml.h"
 
 namespace feeler::cli {
 

@@ -137,6 +137,7 @@ ConvexPiece WithFewerCorners(const ConvexPiece& piece,
       }
     }
   }
+  bool faces_agree = false;
   while (true) {
     std::vector<Eigen::Vector3d> some;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -158,12 +159,16 @@ ConvexPiece WithFewerCorners(const ConvexPiece& piece,
           over = k;
         }
       }
-      const double share = out / tolerance_at(points[i]);
+      if (out <= 0.0) continue;
+      double share = out / tolerance_at(points[i]);
+      // Beyond an edge the piece is farther away than any of its faces; that takes long to tell, and is asked last.
+      if (faces_agree && share <= 1.0) share = DistanceTo(*hull, points[i]) / tolerance_at(points[i]);
       if (share <= worst[over].first) continue;
       worst[over] = {share, i};
       any = true;
     }
-    if (!any) return *std::move(hull);
+    if (!any && faces_agree) return *std::move(hull);
+    faces_agree = !any;
     for (const auto& [share, point] : worst) {
       if (point < points.size()) kept[point] = true;
     }

@@ -31,8 +31,8 @@ std::string Extension(const fs::path& file) { return Lower(file.extension().stri
 /// The faces that the header of a PLY file speaks of. Throws InputError for more of anything than the file has bytes:
 /// no reader is to make room for them.
 std::int64_t CountPly(const fs::path& file) {
-  std::error_code unknown;
-  const auto bytes = static_cast<double>(fs::file_size(file, unknown));
+  std::error_code error;
+  const auto bytes = static_cast<double>(fs::file_size(file, error));
   Lines lines(file);
   std::int64_t faces = 0;
   for (std::string line; lines.Next(line) && lines.number() < 1000;) {
@@ -42,7 +42,7 @@ std::int64_t CountPly(const fs::path& file) {
     if (word != "element") continue;
     const std::string name(NextWord(rest));
     double count = 0;
-    if (!NextNumber(rest, count) || !(count >= 0) || (!unknown && count > bytes)) {
+    if (!NextNumber(rest, count) || !(count >= 0) || (!error && count > bytes)) {
       throw InputError(fmt::format("{}: line {}", file.string(), lines.number()),
                        fmt::format("the header speaks of more elements \"{}\" than the file has bytes", name),
                        "export it again");

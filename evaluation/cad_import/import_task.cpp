@@ -121,11 +121,13 @@ void FewerCorners(const cad::Mating& mating, double budget, ImportedPart& part) 
   constexpr std::size_t kMany = 128;
   constexpr double kFar_m = 2e-5;
   const double near_m = std::clamp(0.9 * (budget - part.tolerance_near_m), 1e-7, 0.4 * budget);
-  const auto tolerance_at = [&](const Eigen::Vector3d& p) {
-    return mating.mating_box.contains(p) ? near_m : std::max(kFar_m, near_m);
-  };
   for (cad::ConvexPiece& piece : part.pieces) {
-    if (piece.surface.points.size() > kMany) piece = cad::WithFewerCorners(piece, tolerance_at);
+    if (piece.surface.points.size() <= kMany) continue;
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& point : piece.surface.points) box.extend(point);
+    // A corner beyond the mating surfaces carries faces that reach into them.
+    const double tolerance_m = mating.mating_box.intersects(box) ? near_m : std::max(kFar_m, near_m);
+    piece = cad::WithFewerCorners(piece, [&](const Eigen::Vector3d&) { return tolerance_m; });
   }
 }
 

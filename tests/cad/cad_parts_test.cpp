@@ -387,6 +387,36 @@ TEST_F(CadParts, EveryMeshFormatIsOnePart) {
   }
 }
 
+// Corners that go leave the piece where it is within the tolerance: at edges, too, where faces are nearer than the
+// piece.
+TEST(FewerCorners, StayWithinTheTolerance) {
+  for (const double height : {0.002, 0.02, 0.2}) {
+    std::vector<Eigen::Vector3d> points;
+    for (int ring = 0; ring <= 16; ++ring) {  // a lens: two caps that meet in a sharp rim
+      const double along = ring / 16.0;
+      for (int k = 0; k < 48; ++k) {
+        const double angle = 2 * M_PI * k / 48;
+        for (const double side : {-1.0, 1.0}) {
+          const double radius = 0.01 * along;
+          points.emplace_back(radius * std::cos(angle), radius * std::sin(angle), side * height * (1 - along * along));
+        }
+      }
+    }
+    const ConvexPiece piece = *HullOf(points);
+    for (const double tolerance_m : {1e-6, 2e-5, 2e-4}) {
+      const ConvexPiece fewer = WithFewerCorners(piece, [&](const Eigen::Vector3d&) { return tolerance_m; });
+      double farthest_m = 0.0;
+      for (const Eigen::Vector3d& point : piece.surface.points) {
+        farthest_m = std::max(farthest_m, DistanceTo(fewer, point));
+      }
+      EXPECT_LE(farthest_m, 1.0001 * tolerance_m) << height;
+      if (tolerance_m > 1e-5) {
+        EXPECT_LT(fewer.surface.points.size(), piece.surface.points.size());
+      }
+    }
+  }
+}
+
 class Files : public CadParts {
  protected:
   std::string Write(const std::string& name, const std::string& text) {
