@@ -158,7 +158,10 @@ Best Lost(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const st
     for (const ConvexPiece* piece : all) {
       if (piece->bounds.squaredExteriorDistance(center) > patch.bound * patch.bound) continue;
       double worst = 0;
-      for (const Eigen::Vector3d& corner : patch.corners) worst = std::max(worst, DistanceTo(*piece, corner));
+      for (const Eigen::Vector3d& corner : patch.corners) {
+        worst = std::max(worst, DistanceTo(*piece, corner));
+        if (worst >= patch.bound) break;  // this piece tells nothing
+      }
       patch.bound = std::min(patch.bound, worst);
     }
     if (patch.bound > best.value + accuracy_m) queue.push(patch);
