@@ -181,11 +181,11 @@ double DistanceTo(const ConvexPiece& piece, const Eigen::Vector3d& point) {
   if (above <= 0) return 0;
   double best = std::numeric_limits<double>::infinity();
   for (int t = 0; t < piece.surface.size(); ++t) {
-    // The nearest place lies on a face that the point is above, no nearer than its plane.
+    // A triangle is no nearer than its plane.
     const Eigen::Vector3d& corner = piece.surface.Corner(t, 0);
     const Eigen::Vector3d normal = (piece.surface.Corner(t, 1) - corner).cross(piece.surface.Corner(t, 2) - corner);
     const double over = normal.dot(point - corner);
-    if (over <= 0.0 || over * over >= best * normal.squaredNorm()) continue;
+    if (over * over >= best * normal.squaredNorm()) continue;
     const Eigen::Vector3d q =
         ClosestOnTriangle(point, piece.surface.Corner(t, 0), piece.surface.Corner(t, 1), piece.surface.Corner(t, 2));
     best = std::min(best, (point - q).squaredNorm());

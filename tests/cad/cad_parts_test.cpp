@@ -13,6 +13,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numbers>
 
 #include "feeler/cad/align/alignment.h"
@@ -22,12 +23,14 @@
 #include "feeler/cad/measure/sliding.h"
 #include "feeler/cad/mesh/flat_points.h"
 #include "feeler/cad/mesh/mesh_check.h"
+#include "feeler/cad/mesh/mesh_tree.h"
 #include "feeler/cad/pieces/decompose.h"
 #include "feeler/cad/readers/read_part.h"
 #include "feeler/cad/readers/zip_model.h"
 #include "feeler/cad/section/convex_partition.h"
 #include "feeler/cad/step/read_step.h"
 #include "feeler/core/error.h"
+#include "feeler/core/random.h"
 #include "tests/cad/kinds/part_shapes.h"
 
 namespace feeler::cad {
@@ -414,6 +417,31 @@ TEST(FewerCorners, StayWithinTheTolerance) {
         EXPECT_LT(fewer.surface.points.size(), piece.surface.points.size());
       }
     }
+  }
+}
+
+// Against every triangle of the surface.
+TEST(ConvexPieces, DistanceIsThatToTheNearestTriangle) {
+  RandomStream random(5, 0, "points");
+  for (int trial = 0; trial < 20; ++trial) {
+    std::vector<Eigen::Vector3d> corners;
+    for (int i = 0; i < 8 + trial; ++i) {
+      corners.push_back(0.01 * Eigen::Vector3d(random.Normal(), random.Normal(), 0.3 * random.Normal()));
+    }
+    const ConvexPiece piece = *HullOf(corners);
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d point = 0.02 * Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
+      double least = std::numeric_limits<double>::infinity();
+      bool outside = false;
+      for (const HalfSpace& plane : piece.planes) outside |= plane.normal.dot(point) > plane.offset_m;
+      for (int t = 0; t < piece.surface.size(); ++t) {
+        const Eigen::Vector3d q = ClosestOnTriangle(point, piece.surface.Corner(t, 0), piece.surface.Corner(t, 1),
+                                                    piece.surface.Corner(t, 2));
+        least = std::min(least, (point - q).norm());
+      }
+      EXPECT_NEAR(DistanceTo(piece, point), outside ? least : 0.0, 1e-12);
+    }
+    for (const Eigen::Vector3d& corner : piece.surface.points) EXPECT_LT(DistanceTo(piece, corner), 1e-8);
   }
 }
 
