@@ -11,25 +11,15 @@
 #include "feeler/planner/belief/lattice_problem.h"
 #include "feeler/planner/noise/noisy_policy.h"
 #include "feeler/planner/noise/solve_noisy.h"
+#include "tests/planner/noise/slot.h"
 
 namespace feeler::planner {
 namespace {
 
-/// A slot in a wall, its place uncertain along both axes: four hypotheses.
+/// The slot, its places not equally likely.
 LatticeProblemData WeightedSlot() {
-  LatticeProblemData data;
-  data.name = "slot";
-  data.size = Cell(7, 6, 1);
-  data.start = Cell(1, 5, 0);
-  data.tool = {Cell::Zero()};
-  for (int x = 0; x <= 5; ++x) {
-    data.target.emplace_back(x, 0, 0);
-    if (x != 2) data.target.emplace_back(x, 1, 0);
-  }
-  for (int x = 0; x < 2; ++x) {
-    for (int y = 0; y < 2; ++y) data.hypotheses.push_back({Cell(x, y, 0), 0, 1.0 + x});
-  }
-  data.move_lengths = {1, 2, 4};
+  LatticeProblemData data = Slot();
+  for (Hypothesis& hypothesis : data.hypotheses) hypothesis.weight = 1.0 + hypothesis.offset.x();
   return data;
 }
 

@@ -24,28 +24,11 @@
 #include "feeler/planner/pomdp/model/controller.h"
 #include "feeler/planner/pomdp/search/solve_pomdp.h"
 #include "feeler/planner/solve.h"
+#include "tests/planner/noise/slot.h"
 #include "tests/planner/random_problems.h"
 
 namespace feeler::planner {
 namespace {
-
-/// A slot in a wall, its place uncertain along both axes: four hypotheses.
-LatticeProblemData Slot() {
-  LatticeProblemData data;
-  data.name = "slot";
-  data.size = Cell(7, 6, 1);
-  data.start = Cell(1, 5, 0);
-  data.tool = {Cell::Zero()};
-  for (int x = 0; x <= 5; ++x) {
-    data.target.emplace_back(x, 0, 0);
-    if (x != 2) data.target.emplace_back(x, 1, 0);
-  }
-  for (int x = 0; x < 2; ++x) {
-    for (int y = 0; y < 2; ++y) data.hypotheses.push_back({Cell(x, y, 0), 0, 1.0});
-  }
-  data.move_lengths = {1, 2, 4};
-  return data;
-}
 
 NoisyProblem Noisy(const LatticeProblemData& data, const Noise& noise, double confidence = 0.51) {
   return {MakeLatticeProblem(data), noise, {confidence, 100.0}};
