@@ -115,6 +115,14 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
   constexpr double kComeOff = 0.5;
   const bool careful = record_.careful;
   const Eigen::Vector3d from = position_;
+  // Where all ways are fast there is nothing to gain.
+  if (const auto free = EndOfFreeWay(target); free && (careful || free_by == FreeBy::kEstimate)) {
+    const double gone = (*free - from).norm();
+    PredictedCells rest = predicted;
+    if (rest) rest = {(*predicted)[0] - gone, (*predicted)[1] - gone};
+    const MotionReport outside = FastOnce(*free, kind, {}, FreeBy::kBelief);
+    return outside.contact ? outside : Fast(target, kind, rest, free_by);
+  }
   MotionReport report = FastOnce(target, kind, predicted, free_by);
   for (int i = 0; doubts_ && report.contact && i < kMostFalse; ++i) {
     const Eigen::Vector3d place = report.end;
@@ -233,6 +241,18 @@ bool Mover::StaysOut(const Eigen::Vector3d& target) const {
   const int axis = AxisOf(outmost_->first);
   const double out = -SignOf(outmost_->first);
   return std::min(out * position_[axis], out * target[axis]) >= out * outmost_->second;
+}
+
+std::optional<Eigen::Vector3d> Mover::EndOfFreeWay(const Eigen::Vector3d& target) const {
+  constexpr double kLeast = 1.0;  // a shorter way is not worth a motion of its own
+  const Eigen::Vector3d way = target - position_;
+  if (!outmost_ || way.isZero() || DirectionOf(way) != outmost_->first) return std::nullopt;
+  const int axis = AxisOf(outmost_->first);
+  const double out = -SignOf(outmost_->first);
+  if (out * (position_[axis] - outmost_->second) < kLeast || out * (outmost_->second - target[axis]) <= 0.0) {
+    return std::nullopt;
+  }
+  return Eigen::Vector3d(position_ + way * ((outmost_->second - position_[axis]) / way[axis]));
 }
 
 double Mover::SpeedInto(const Eigen::Vector3d& direction, bool held) const {

@@ -97,7 +97,7 @@ class Mover {
   /// are no faster than kUnfelt_m_s.
   void KeepLowInto(std::optional<Direction> insertion) { unfelt_ = insertion; }
   /// Nothing of the target stands farther out, against `insertion`, than this coordinate along it, which was felt: ways
-  /// that stay out there are free whatever surprised the tool below.
+  /// that stay out there are free whatever surprised the tool below, and ways straight in are so up to there.
   void KeepClearOf(Direction insertion, double outmost) { outmost_ = {insertion, outmost}; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
@@ -115,6 +115,8 @@ class Mover {
   double SpeedOfCarefulWay(const Eigen::Vector3d& way) const;
   /// The way to `target` stays outside of KeepClearOf.
   bool StaysOut(const Eigen::Vector3d& target) const;
+  /// Where a way straight in comes to what KeepClearOf tells; empty if it does not, or begins there.
+  std::optional<Eigen::Vector3d> EndOfFreeWay(const Eigen::Vector3d& target) const;
   void CheckLimits() const;
   /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
   MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,

@@ -17,6 +17,8 @@ constexpr double kNearestWall = 1.5;
 constexpr double kFarthestWall = 2.5;
 /// A tool that begins a touch stands off the wall by this at least, wherever it is, cells.
 constexpr double kOffWall = 0.25;
+/// A wall that is not where it was expected is looked for within so many times the slack.
+constexpr double kFartherOff = 2.0;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameTravel = 0.2;
 
@@ -36,6 +38,15 @@ std::optional<Cell> InFront(const planner::ContactMap& map, Cell line, Direction
 bool SameWall(const planner::ContactMap& map, const Cell& a, const Cell& b, Direction direction, int orientation) {
   return !map.Blocked(b, orientation) &&
          std::abs(map.Travel(a, direction, orientation) - map.Travel(b, direction, orientation)) <= kSameTravel;
+}
+
+/// Around a target that may not be where it is thought to be. False: there is no way, or something met on it.
+bool GoTo(const planner::ContactMap& map, const Eigen::Vector3d& target, int orientation, const Cell& goal,
+          Mover& mover) {
+  const Cell here = NearestFree(map, mover.position() - target, orientation);
+  const auto path = FindFreePath(map, here, EndAt(goal), orientation, true);
+  std::vector<Touch> ignored;
+  return path && FollowPath(map, target, *path, "transfer", mover, ignored);
 }
 
 }  // namespace
@@ -71,11 +82,12 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
          IsClear(map, goal - UnitCell(wall.direction), orientation)) {
     goal -= UnitCell(wall.direction);
   }
-  const auto path =
-      FindFreePath(map, NearestFree(map, mover.position() - target, orientation), EndAt(goal), orientation, true);
-  if (!path) return std::nullopt;
-  std::vector<Touch> ignored;
-  if (!FollowPath(map, target, *path, "transfer", mover, ignored)) return std::nullopt;
+  const int axis = AxisOf(wall.direction);
+  // First as far out as the touch begins, then along the wall: one that stands farther out is not met on the way.
+  Cell beside = NearestFree(map, mover.position() - target, orientation);
+  beside[axis] = goal[axis];
+  if (IsClear(map, beside, orientation) && !GoTo(map, target, orientation, beside, mover)) return std::nullopt;
+  if (!GoTo(map, target, orientation, goal, mover)) return std::nullopt;
   // Where the tool stood already need not be a lattice point.
   const Eigen::Vector3d place = target + goal.cast<double>() + map.phase();
   const Eigen::Vector3d before = mover.position();
@@ -83,7 +95,6 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
     mover.Retreat(before);
     return std::nullopt;
   }
-  const int axis = AxisOf(wall.direction);
   const int sign = SignOf(wall.direction);
   const double travel = map.Travel(goal, wall.direction, orientation);
   const double from = mover.position()[axis];
@@ -97,24 +108,32 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
 }
 
 std::optional<Eigen::Vector3d> Recenter(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
-                                        int orientation, double slack, Mover& mover) {
+                                        int orientation, Sides sides, double slack, Mover& mover) {
+  std::vector<BroadWall> walls;
+  for (const Direction direction : kDirections) {
+    if (AxisOf(direction) == AxisOf(task.insertion)) continue;
+    if (const auto wall = FindBroadWall(map, task.insertion, direction, orientation)) walls.push_back(*wall);
+  }
   Eigen::Vector3d centre = target;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (axis == AxisOf(task.insertion)) continue;
-    double sum = 0.0;
-    int sides = 0;
-    for (const int sign : {1, -1}) {
-      const Direction direction = MakeDirection(axis, sign);
-      const auto wall = FindBroadWall(map, task.insertion, direction, orientation);
-      if (!wall) continue;
-      const auto met = TouchWall(map, centre, orientation, *wall, 0, slack, "confirm", mover);
-      if (!met) return std::nullopt;
-      const double expected = centre[axis] + wall->middle[axis] + map.phase()[axis] +
-                              sign * static_cast<double>(map.Travel(wall->middle, direction, orientation));
-      sum += *met - expected;
-      ++sides;
+  std::array<int, 3> touched{};
+  while (!walls.empty()) {
+    const Eigen::Vector3d here = mover.position() - centre;
+    const auto nearest = std::ranges::min_element(
+        walls, {}, [&](const BroadWall& wall) { return (here - wall.middle.cast<double>()).norm(); });
+    const BroadWall wall = *nearest;
+    walls.erase(nearest);
+    const int axis = AxisOf(wall.direction);
+    auto met = TouchWall(map, centre, orientation, wall, 0, slack, "confirm", mover);
+    // One that stands farther off than thought is not met, or met on the way to it: from farther off, once more.
+    if (!met) met = TouchWall(map, centre, orientation, wall, 0, kFartherOff * slack, "confirm", mover);
+    if (!met) return std::nullopt;
+    const double expected =
+        centre[axis] + wall.middle[axis] + map.phase()[axis] +
+        SignOf(wall.direction) * static_cast<double>(map.Travel(wall.middle, wall.direction, orientation));
+    centre[axis] += (*met - expected) / ++touched[static_cast<std::size_t>(axis)];  // the mean over the sides
+    if (sides == Sides::kNearest) {
+      std::erase_if(walls, [&](const BroadWall& other) { return AxisOf(other.direction) == axis; });
     }
-    if (sides > 0) centre[axis] += sum / sides;
   }
   return centre;
 }

@@ -30,10 +30,16 @@ std::optional<BroadWall> FindBroadWall(const planner::ContactMap& map, Direction
 std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vector3d& target, int orientation,
                                 const BroadWall& wall, int offset, double slack, const char* kind, Mover& mover);
 
-/// Where the target is across the insertion, from touches of opposite sides, each within `slack` cells of where it is
-/// expected: what both sides stand farther out by, or a tool that is turned a little, cancels. An axis that cannot be
-/// touched from both sides is felt from one, or left. Empty if a touch contradicts the contact map.
+/// The sides of a target that Recenter touches along each axis.
+enum class Sides {
+  kNearest,  ///< the one that is nearest to the tool
+  kBoth,     ///< opposite ones: what both stand farther out by, or a tool that is turned a little, cancels
+};
+
+/// Where the target is across the insertion, from touches of its sides, each within `slack` cells of where it is
+/// expected, the nearest first; one that is not there is looked for once more, twice as far around. An axis that cannot
+/// be touched from both sides is felt from one, or left. Empty if a touch contradicts the contact map.
 std::optional<Eigen::Vector3d> Recenter(const Task& task, const planner::ContactMap& map, const Eigen::Vector3d& target,
-                                        int orientation, double slack, Mover& mover);
+                                        int orientation, Sides sides, double slack, Mover& mover);
 
 }  // namespace feeler::execution

@@ -219,12 +219,14 @@ void RecordEstimate(const Episode& episode, const LatticeFrame& frame, const Tar
 }
 
 Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, const Pose& world_T_estimate,
-                   policies::Policy& policy) {
+                   policies::Policy& policy, std::optional<double> outmost) {
   Attempt attempt;
   attempt.frame = FrameOf(episode.task, problem, world_T_estimate);
   attempt.possible = PossibleRegion(problem);
   Mover mover(episode.robot, attempt.frame, episode.options, episode.record, episode.started_s);
   if (policy.doubt() != nullptr) mover.DoubtContacts();
+  const Direction insertion = episode.task.insertion;
+  if (outmost) mover.KeepClearOf(insertion, attempt.frame.center[AxisOf(insertion)] + *outmost);
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();
   const double off = (mover.position() - start).cwiseAbs().maxCoeff();
   if (off > 0.5) {

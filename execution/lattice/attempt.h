@@ -43,8 +43,9 @@ struct Attempt {
   std::vector<Touch> evidence;  ///< in lattice coordinates of the frame
   std::optional<Eigen::Vector3d> target;
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< half width of what the last refit leaves, per axis, cells
-  bool sure = false;   ///< the fit explains every touch, and a contact pins each axis across the insertion
-  bool tried = false;  ///< the tool was pushed at the target
+  bool sure = false;    ///< the fit explains every touch, and a contact pins each axis across the insertion
+  bool tried = false;   ///< the tool was pushed at the target
+  bool turned = false;  ///< the frame is turned as the target was felt to be: `spread` says how well it is placed
   int orientation = 0;
 };
 
@@ -53,9 +54,10 @@ struct Attempt {
 LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Pose& world_T_estimate);
 
 /// Follows the policy from the start pose of the problem, confirms, inserts. Fills the record as it goes. Throws
-/// ExecutionFailure for what no other plan can mend.
+/// ExecutionFailure for what no other plan can mend. `outmost`: how far out from the estimate, along the insertion,
+/// anything of the target stands, cells, where that was felt (Mover::KeepClearOf).
 Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, const Pose& world_T_estimate,
-                   policies::Policy& policy);
+                   policies::Policy& policy, std::optional<double> outmost = {});
 
 /// The fit explains every touch, and a contact pins each axis across the insertion.
 bool IsSure(const Task& task, const TargetFit& fit);

@@ -85,7 +85,7 @@ void ComeOff(const Task& task, const Eigen::Vector3d& target, Mover& mover) {
   mover.Retreat(place);
 }
 
-/// Rungs 1 and 2. True: inserted, or blocked at a place that the touches agree on.
+/// Rungs 1 and 2. Leaves the attempt blocked where an insertion is, or where the touches agree on no place.
 void Refit(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
   if (attempt.evidence.empty()) return;
   const Task& task = episode.task;
@@ -97,8 +97,13 @@ void Refit(const Episode& episode, const planner::Problem& problem, Attempt& att
   attempt.target = fit.position;
   attempt.spread = fit.half_width;
   attempt.sure = false;
+  if (fit.violations > 0) {
+    // As for a turned target, which can be felt.
+    attempt.end = AttemptEnd::kBlocked;
+    return;
+  }
   const double widest = 2.0 * fit.half_width.maxCoeff() * task.cell_m;
-  if (fit.violations > 0 || widest > kNarrow_m) return;
+  if (widest > kNarrow_m) return;
 
   Log(episode, rung::kInsertOnRefit, fmt::format("spread {:.1f} mm", 1e3 * widest));
   Mover mover = MoverFor(episode, attempt.frame);
@@ -134,6 +139,57 @@ bool InsertTurned(const Episode& episode, const planner::Problem& problem, doubl
   return attempt.end == AttemptEnd::kInserted;
 }
 
+/// How far from the middle of the target, across the insertion, the farthest of its contacts was, cells.
+double FarthestContact(const Task& task, const Attempt& attempt) {
+  double farthest = 0.0;
+  for (const Touch& touch : attempt.evidence) {
+    if (!touch.contact) continue;
+    Eigen::Vector3d across = touch.end() - *attempt.target;
+    across[AxisOf(task.insertion)] = 0.0;
+    farthest = std::max(farthest, across.norm());
+  }
+  return farthest;
+}
+
+/// What was felt along the insertion, in a frame that is turned about it; what was felt across it is along no axis of
+/// that frame.
+std::vector<Touch> TurnedEvidence(const Task& task, const Attempt& attempt, const LatticeFrame& turned) {
+  std::vector<Touch> evidence;
+  for (Touch touch : attempt.evidence) {
+    if (touch.is_oblique() || AxisOf(touch.direction) != AxisOf(task.insertion)) continue;
+    touch.start = turned.FromWorld(attempt.frame.ToWorld(touch.start));
+    evidence.push_back(touch);
+  }
+  return evidence;
+}
+
+/// Feels where the sides of the target are, and inserts: of each axis first the nearest side, then, if that was not
+/// good enough, both. Leaves the attempt lost, to look `slack` cells around, if a side is not there.
+void InsertRecentred(const Episode& episode, const planner::Problem& problem, double slack, Attempt& attempt) {
+  const Task& task = episode.task;
+  const planner::ContactMap& map = *problem.map;
+  Mover mover = MoverFor(episode, attempt.frame);
+  mover.TrustAgain();  // the turn is what was not known
+  for (const Sides sides : {Sides::kNearest, Sides::kBoth}) {
+    const auto centre = Recenter(task, map, *attempt.target, attempt.orientation, sides, slack, mover);
+    Eigen::Vector3d spread = Eigen::Vector3d::Constant(centre ? 0.1 : slack);
+    spread[AxisOf(task.insertion)] = 0.1;
+    if (centre) attempt.target = centre;
+    attempt.possible = {*attempt.target - spread.cwiseMax(1.0), *attempt.target + spread.cwiseMax(1.0)};
+    attempt.spread = spread;
+    attempt.sure = centre.has_value();
+    if (!centre) {
+      attempt.end = AttemptEnd::kLost;
+      attempt.reason = "yaw fit: the sides of the target are not where they should be";
+      return;
+    }
+    Conclude(episode, attempt.frame, *centre,
+             ApproachAndInsert(task, map, *centre, attempt.orientation, mover, attempt.evidence), attempt);
+    if (attempt.end != AttemptEnd::kBlocked) return;
+    if (sides == Sides::kNearest) ComeOff(task, *centre, mover);
+  }
+}
+
 /// Feels how far the target is turned; from then on the frame of the attempt is turned with it. Leaves the attempt lost
 /// if the touches do not find the target where it is believed.
 void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
@@ -161,25 +217,15 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
   }
   const double yaw_rad = std::abs(fit->yaw_rad) < kSmallestTurn_rad ? 0.0 : fit->yaw_rad;
   const LatticeFrame turned = TurnedFrame(attempt.frame, task.insertion, *attempt.target, yaw_rad);
-  Mover turned_mover = MoverFor(episode, turned);
-  turned_mover.TrustAgain();  // the turn is what was not known
-  // What was felt before on one side of the middle was farther or nearer by the turn.
-  const double slack = kCentreOff + 0.5 * fit->baseline_cells * std::tan(std::abs(yaw_rad));
-  const auto centre = Recenter(task, map, fit->middle, attempt.orientation, slack, turned_mover);
-  if (!centre) {
-    attempt.end = AttemptEnd::kLost;
-    attempt.reason = "yaw fit: the sides of the target are not where they should be";
-    return;
-  }
+  // The farther from the middle of a turned target a touch was, the more it is off.
+  const double slack = kCentreOff + FarthestContact(task, attempt) * std::tan(std::abs(yaw_rad));
   // From here on the attempt is one in the turned frame.
-  attempt.evidence.clear();
+  attempt.evidence = TurnedEvidence(task, attempt, turned);
   attempt.frame = turned;
-  attempt.target = *centre;
-  attempt.possible = {*centre - Eigen::Vector3d::Ones(), *centre + Eigen::Vector3d::Ones()};
-  attempt.spread = Eigen::Vector3d::Constant(0.1);
-  attempt.sure = true;
-  Conclude(episode, turned, *centre,
-           ApproachAndInsert(task, map, *centre, attempt.orientation, turned_mover, attempt.evidence), attempt);
+  attempt.turned = true;
+  attempt.target = fit->middle;
+  attempt.tried = false;
+  InsertRecentred(episode, problem, slack, attempt);
 }
 
 void SweepYaw(const Episode& episode, const planner::Problem& problem, Attempt& attempt) {
@@ -253,7 +299,7 @@ std::optional<Attempt> NewAttempt(const Episode& episode, const planner::Problem
   const std::unique_ptr<policies::Policy> policy = planner.PolicyFor(problem);
   if (!policy) return std::nullopt;
   GoToStart(episode, problem, FrameOf(episode.task, problem, world_T_estimate), outmost);
-  return RunAttempt(episode, problem, world_T_estimate, *policy);
+  return RunAttempt(episode, problem, world_T_estimate, *policy, outmost);
 }
 
 /// Hypotheses along each axis of the task (1 where it is certain) around a refit.
@@ -284,7 +330,7 @@ std::string ClimbLadder(const Episode& episode, const planner::Problem& problem,
   for (int retry = 0;; ++retry) {
     // First what takes no other place to be right: touches of a turned target do not agree on one, either.
     AtMouth(FitYaw, episode, problem, attempt);
-    if (attempt.end == AttemptEnd::kLost) {
+    if (attempt.end == AttemptEnd::kLost && !attempt.turned) {
       Refit(episode, problem, attempt);
       AtMouth(FitYaw, episode, problem, attempt);
     }

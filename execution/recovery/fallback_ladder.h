@@ -24,11 +24,13 @@ inline constexpr const char* kGiveUp = "give up";
 ///
 ///   repeat three times:
 ///     if the insertion is blocked: yaw fit
-///     if the target is not there:
+///     if the target is not there, and was not felt to be turned:
 ///       refit over the touches of the attempt, in the start belief and around it (a quarter of the task's uncertainty)
-///       if it is narrow enough: confirm and insert; if that is blocked: yaw fit
+///       if no place explains them: yaw fit
+///       else if it is narrow enough: confirm and insert; if that is blocked: yaw fit
 ///     if the insertion is blocked: yaw sweep; spiral
-///     new attempt: first with the hypotheses around the refit, then with the whole cuboid and a margin
+///     new attempt: first with the hypotheses around the refit, turned as the target was felt to be, then with the
+///       whole cuboid and a margin
 ///   give up
 ///
 /// Each rung that is used is logged in the record, with what brought it about. Returns the reason of the episode's

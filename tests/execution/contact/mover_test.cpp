@@ -20,7 +20,7 @@
 namespace feeler::execution {
 namespace {
 
-/// A tool that meets something at the end of every motion.
+/// A tool that meets something at the end of every motion, as long as it `meets` anything.
 class HardRobot final : public Robot {
  public:
   explicit HardRobot(double harder) : harder_(harder) {
@@ -52,6 +52,7 @@ class HardRobot final : public Robot {
   }
 
   std::vector<double> speeds_m_s;
+  bool meets = true;
   std::optional<Eigen::Vector3d> stiff_n_m;  ///< along each axis, between them by the squares of the cosines
 
  private:
@@ -60,10 +61,11 @@ class HardRobot final : public Robot {
     pose_ = goal;
     time_s_ += 0.1;
     MotionResult result;
+    result.world_T_tool = pose_;
+    if (!meets) return result;
     result.reason = StopReason::kContact;
     result.contact = true;
     result.peak_force_n = harder_ * speed_m_s * ForcePerSpeed(contact_);
-    result.world_T_tool = pose_;
     return result;
   }
 
@@ -173,8 +175,39 @@ TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 8.0}), fast_m_s);
   // Out is against the insertion, along any axis.
   mover.KeepClearOf(Direction::kPlusX, 30.0);
-  EXPECT_EQ(speed_to(mover, {10.0, 0.0, 0.0}), fast_m_s);
+  EXPECT_EQ(speed_to(mover, {29.5, 0.0, 0.0}), fast_m_s);
   EXPECT_LT(speed_to(mover, {31.0, 0.0, 0.0}), fast_m_s);
+}
+
+// A careful way straight in is fast up to what stands out farthest; the two motions make the whole way.
+TEST(Mover, GoesFastDownToWhatItIsToKeepClearOf) {
+  Bench bench(1.0);
+  bench.record.careful = true;
+  bench.robot.meets = false;
+  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  mover.Retreat({20.0, 0.0, 12.0});
+  mover.KeepClearOf(Direction::kMinusZ, 5.0);
+  const std::size_t before = bench.robot.speeds_m_s.size();
+  mover.Fast({20.0, 0.0, 2.0}, "transfer", {{{8.0, 9.0}}});
+  ASSERT_EQ(bench.robot.speeds_m_s.size(), before + 2);
+  EXPECT_EQ(bench.robot.speeds_m_s[before], bench.options.transfer_speed_m_s);
+  EXPECT_LT(bench.robot.speeds_m_s[before + 1], bench.options.transfer_speed_m_s);
+  ASSERT_GE(bench.record.moves.size(), 2u);
+  const MoveRecord& inner = bench.record.moves.back();
+  EXPECT_NEAR(inner.commanded_m, 3.0 * bench.frame.cell_m, 1e-9);
+  ASSERT_TRUE(inner.predicted_m);
+  EXPECT_NEAR((*inner.predicted_m)[0], 1.0 * bench.frame.cell_m, 1e-9) << "counted from where the second begins";
+  // Nothing is gained where the way does not come from well outside, or is fast anyway.
+  mover.Retreat({20.0, 0.0, 5.5});
+  std::size_t count = bench.robot.speeds_m_s.size();
+  bench.record.careful = true;
+  mover.Fast({20.0, 0.0, 2.0}, "transfer");
+  EXPECT_EQ(bench.robot.speeds_m_s.size(), count + 1);
+  mover.TrustAgain();
+  mover.Retreat({20.0, 0.0, 12.0});
+  count = bench.robot.speeds_m_s.size();
+  mover.Fast({20.0, 0.0, 2.0}, "transfer");
+  EXPECT_EQ(bench.robot.speeds_m_s.size(), count + 1);
 }
 
 // The robot of the bench says so where one is none: after a surprise ways are judged at edges slanted to them.

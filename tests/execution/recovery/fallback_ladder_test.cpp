@@ -15,6 +15,7 @@
 #include <numbers>
 #include <vector>
 
+#include "feeler/execution/contact/wall_touch.h"
 #include "feeler/execution/executor.h"
 #include "feeler/execution/lattice/yaw_fit.h"
 #include "feeler/execution/recovery/online_planner.h"
@@ -239,6 +240,54 @@ TEST(YawFit, EqualsTheYawOfTheWorld) {
     EXPECT_NEAR(fit->yaw_rad, degrees * kDegree, 0.15 * kDegree);
     EXPECT_EQ(evidence.size(), 2u);
   }
+}
+
+struct Centring {
+  std::optional<Eigen::Vector3d> centre;
+  int touches = 0;
+};
+
+/// Recenter from above the mouth of a target that stands `off` (cells) from where it is believed.
+Centring Centre(Sides sides, double slack, const Eigen::Vector3d& off) {
+  const Task task = HousingTask();
+  const LatticeFrame frame{Pose::Identity(), Eigen::Vector3d::Zero(), task.cell_m};
+  const Pose truth = MakePose(off * task.cell_m);
+  RobotFaults faults;
+  faults.tracking_m = 0.0;
+  KinematicRobot robot(HousingOverPanel(), task, truth, MakePose({0.0, 0.0, 0.02}), faults,
+                       RandomStream(3, 1, "robot"));
+  ExecutionRecord record;
+  const ExecutorOptions options;
+  Mover mover(robot, frame, options, record, 0.0);
+  Centring found;
+  found.centre = Recenter(task, *HousingMap(), Eigen::Vector3d::Zero(), 0, sides, slack, mover);
+  for (const MoveRecord& move : record.moves) found.touches += move.kind == "confirm" ? 1 : 0;
+  return found;
+}
+
+// One touch an axis is off by what a touch is read deeper by, two touches cancel it.
+TEST(Recenter, FindsTheMiddleFromOneSideOrFromBoth) {
+  for (const Eigen::Vector3d& off : {Eigen::Vector3d(0.4, -0.7, 0.0), Eigen::Vector3d(-0.9, 0.2, 0.0)}) {
+    const Centring nearest = Centre(Sides::kNearest, 1.25, off);
+    ASSERT_TRUE(nearest.centre);
+    EXPECT_EQ(nearest.touches, 2);
+    EXPECT_LT((*nearest.centre - off).cwiseAbs().maxCoeff(), 0.25);
+    const Centring both = Centre(Sides::kBoth, 1.25, off);
+    ASSERT_TRUE(both.centre);
+    EXPECT_EQ(both.touches, 4);
+    EXPECT_LT((*both.centre - off).cwiseAbs().maxCoeff(), 0.12);
+  }
+}
+
+TEST(Recenter, LooksTwiceAsFarAroundForAWallThatIsNotThere) {
+  // To either side of the slack, whichever wall of an axis is the nearest.
+  for (const double off : {-2.2, 2.2}) {
+    const Centring found = Centre(Sides::kNearest, 1.25, {off, off, 0.0});
+    ASSERT_TRUE(found.centre) << off;
+    EXPECT_NEAR(found.centre->x(), off, 0.25);
+    EXPECT_NEAR(found.centre->y(), off, 0.25);
+  }
+  EXPECT_FALSE(Centre(Sides::kNearest, 1.25, {6.0, 0.0, 0.0}).centre);
 }
 
 }  // namespace
