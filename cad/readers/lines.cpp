@@ -19,6 +19,11 @@ bool Lines::Next(std::string& line) {
   return true;
 }
 
+bool Lines::Read(std::span<char> bytes) {
+  const auto wanted = static_cast<std::streamsize>(bytes.size());
+  return in_.rdbuf()->sgetn(bytes.data(), wanted) == wanted;
+}
+
 std::string_view NextWord(std::string_view& rest) {
   const std::size_t begin = rest.find_first_not_of(" \t");
   if (begin == std::string_view::npos) return {};

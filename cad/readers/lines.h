@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -13,6 +14,8 @@ class Lines {
   explicit Lines(const std::filesystem::path& file) : in_(file, std::ios::binary) {}
   /// The next line, without its end; false after the last.
   bool Next(std::string& line);
+  /// The bytes behind it; false if there are fewer.
+  bool Read(std::span<char> bytes);
   int number() const { return number_; }  ///< of the line that was read last, from 1
 
  private:

@@ -12,6 +12,7 @@
 
 #include "feeler/cad/readers/lines.h"
 #include "feeler/cad/readers/read_obj.h"
+#include "feeler/cad/readers/read_ply.h"
 #include "feeler/cad/readers/read_stl.h"
 #include "feeler/cad/readers/zip_model.h"
 #include "feeler/core/error.h"
@@ -22,35 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string Extension(const fs::path& file) { return Lower(file.extension().string()); }
-
-[[noreturn]] void TooMany(const fs::path& file, std::int64_t triangles) {
-  throw InputError(file.string(), fmt::format("has {} triangles, more than {}", triangles, kMostTriangles),
-                   "export it coarser: a part needs some thousands");
-}
-
-/// The faces that the header of a PLY file speaks of. Throws InputError for more of anything than the file has bytes:
-/// no reader is to make room for them.
-std::int64_t CountPly(const fs::path& file) {
-  std::error_code error;
-  const auto bytes = static_cast<double>(fs::file_size(file, error));
-  Lines lines(file);
-  std::int64_t faces = 0;
-  for (std::string line; lines.Next(line) && lines.number() < 1000;) {
-    std::string_view rest(line);
-    const std::string_view word = NextWord(rest);
-    if (word == "end_header") break;
-    if (word != "element") continue;
-    const std::string name(NextWord(rest));
-    double count = 0;
-    if (!NextNumber(rest, count) || !(count >= 0) || (!error && count > bytes)) {
-      throw InputError(fmt::format("{}: line {}", file.string(), lines.number()),
-                       fmt::format("the header speaks of more elements \"{}\" than the file has bytes", name),
-                       "export it again");
-    }
-    if (name == "face") faces = static_cast<std::int64_t>(count);
-  }
-  return faces;
-}
 
 /// No triangle of a 3MF model takes fewer bytes than `<triangle v1="0" v2="1" v3="2"/>`, and half a vertex.
 std::int64_t Count3mf(const fs::path& file) {
@@ -65,21 +37,19 @@ void RequireModest(const fs::path& file, const std::string& extension) {
     triangles = CountStl(file, kMostTriangles);
   } else if (extension == ".obj") {
     triangles = CountObj(file, kMostTriangles);
-  } else if (extension == ".ply") {
-    triangles = CountPly(file);
-  } else {
+  } else if (extension == ".3mf") {
     triangles = Count3mf(file) / 2;  // they may take twice as many
   }
   if (triangles > kMostTriangles) TooMany(file, triangles);
 }
 
-RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
+RawPart Read3mf(const fs::path& file) {
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   const aiScene* scene =
       importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices);
   if (scene == nullptr) throw InputError(file.string(), importer.GetErrorString(), "export it again, or as STL");
-  RawPart part{format, {}, std::nullopt};
+  RawPart part{"3MF", {}, ParseUnit("mm")};  // what the format means where it does not say another
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
     const aiMesh& mesh = *scene->mMeshes[m];
     RawBody body{mesh.mName.length > 0 ? mesh.mName.C_Str() : fmt::format("body {}", m + 1), {}, {}};
@@ -95,6 +65,11 @@ RawPart ReadWithAssimp(const fs::path& file, const std::string& format) {
     }
     if (!body.mesh.triangles.empty()) part.bodies.push_back(std::move(body));
   }
+  const std::optional<ZipModel> model = PeekZipModel(file);
+  if (const auto unit = model ? UnitOfModel(model->head) : std::nullopt) {
+    part.unit = Unit{unit->name, unit->metres};
+    part.unit_is_stated = true;
+  }
   return part;
 }
 
@@ -108,16 +83,7 @@ RawPart ReadAll(const fs::path& file, const StepReader& step) {
   RequireModest(file, extension);
   if (extension == ".obj") return ReadObj(file);
   if (extension == ".stl") return ReadStl(file);
-  RawPart part = ReadWithAssimp(file, extension == ".ply" ? "PLY" : "3MF");
-  if (extension == ".3mf") {
-    part.unit = ParseUnit("mm");  // what the format means where it does not say another
-    const std::optional<ZipModel> model = PeekZipModel(file);
-    if (const auto unit = model ? UnitOfModel(model->head) : std::nullopt) {
-      part.unit = Unit{unit->name, unit->metres};
-      part.unit_is_stated = true;
-    }
-  }
-  return part;
+  return extension == ".ply" ? ReadPly(file) : Read3mf(file);
 }
 
 void KeepBody(const PartSource& source, RawPart& part) {
@@ -142,6 +108,11 @@ void KeepBody(const PartSource& source, RawPart& part) {
 }
 
 }  // namespace
+
+void TooMany(const fs::path& file, std::int64_t triangles) {
+  throw InputError(file.string(), fmt::format("has {} triangles, more than {}", triangles, kMostTriangles),
+                   "export it coarser: a part needs some thousands");
+}
 
 Unit ParseUnit(const std::string& name) {
   for (const Unit& unit : {Unit{"mm", 1e-3}, Unit{"cm", 1e-2}, Unit{"m", 1.0}, Unit{"in", 0.0254}, Unit{"um", 1e-6}}) {

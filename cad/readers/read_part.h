@@ -37,6 +37,8 @@ struct RawPart {
 
 /// More triangles than this are refused: what a part needs is a hundredth.
 constexpr std::int64_t kMostTriangles = 1'000'000;
+/// Throws the InputError of a file that has so many.
+[[noreturn]] void TooMany(const std::filesystem::path& file, std::int64_t triangles);
 
 /// Reads a STEP file as triangles (cad/step/).
 using StepReader = std::function<RawPart(const std::filesystem::path&)>;

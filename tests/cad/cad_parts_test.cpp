@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -489,6 +490,86 @@ TEST_F(Files, APlyHoldsWhatItsHeaderSpeaksOf) {
         << many;
     EXPECT_THAT(MessageOf([&] { Raw(Write("bad.ply", ply("3", many))); }), testing::HasSubstr("line 7")) << many;
   }
+}
+
+/// The bytes of a number, least first or last.
+template <typename T>
+std::string BytesOf(T value, bool big) {
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);
+  if (big) std::reverse(bytes.begin(), bytes.end());
+  return bytes;
+}
+
+// A square (one face of four corners) with normals, colours and edges beside it, in all three formats.
+TEST_F(Files, APlyIsReadInAllItsFormats) {
+  const std::string header =
+      "comment of a square\nelement vertex 4\nproperty double x\nproperty float nx\nproperty double y\n"
+      "property double z\nproperty uchar red\nelement edge 1\nproperty int vertex1\nelement face 1\n"
+      "property short flags\nproperty list ushort uint vertex_index\nend_header\n";
+  const double corners[4][3] = {{0, 0, 0.5}, {2, 0, 0.5}, {2, 1, 0.5}, {0, 1, 0.5}};
+  std::string ascii = "ply\r\nformat ascii 1.0\n" + header;
+  for (const auto& c : corners) ascii += fmt::format("{} 0.25 {} {} 255\n\n", c[0], c[1], c[2]);
+  ascii += "7\n-3 4 0 1 2 3\n";
+  std::vector<std::string> files{ascii};
+  for (const bool big : {false, true}) {
+    std::string text = fmt::format("ply\nformat binary_{}_endian 1.0\n{}", big ? "big" : "little", header);
+    for (const auto& c : corners) {
+      text += BytesOf(c[0], big) + BytesOf(0.25F, big) + BytesOf(c[1], big) + BytesOf(c[2], big) + '\xff';
+    }
+    text += BytesOf(std::int32_t{7}, big) + BytesOf(std::int16_t{-3}, big) + BytesOf(std::uint16_t{4}, big);
+    for (std::uint32_t k = 0; k < 4; ++k) text += BytesOf(k, big);
+    files.push_back(text);
+  }
+  for (const std::string& text : files) {
+    const RawPart part = Raw(Write("square.ply", text));
+    ASSERT_EQ(part.bodies.size(), 1u) << part.format;
+    const TriangleMesh& mesh = part.bodies.front().mesh;
+    ASSERT_EQ(mesh.points.size(), 4u) << part.format;
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(mesh.points[k], Eigen::Vector3d(corners[k][0], corners[k][1], corners[k][2])) << part.format;
+    }
+    double area = 0.0;
+    for (const auto& t : mesh.triangles) {
+      const auto at = [&](int k) { return mesh.points[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])]; };
+      area += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).z();
+    }
+    EXPECT_DOUBLE_EQ(area, 2.0) << part.format;
+    EXPECT_THAT(part.notes, testing::Contains(testing::HasSubstr("1 elements \"edge\""))) << part.format;
+  }
+  // Cut short anywhere behind the header: said, never read as less.
+  for (const std::string& text : files) {
+    for (const std::size_t less : {std::size_t{3}, std::size_t{20}, std::size_t{60}}) {
+      EXPECT_NE(MessageOf([&] { Raw(Write("short.ply", text.substr(0, text.size() - less))); }), "") << less;
+    }
+  }
+}
+
+TEST_F(Files, APlyOfAnotherFormIsRefusedWhereItIs) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string points = "end_header\n0 0 0\n1 0 0\n0 1 0\n";
+  const auto message = [&](const std::string& text) { return MessageOf([&] { Raw(Write("bad.ply", text)); }); };
+  const std::pair<std::string, std::string> bad[] = {
+      {head + "end_header\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "line 11: fewer numbers than a vertex has"},
+      {head + points + "3 0 1 2 9\n", "line 13: more numbers than a face has"},
+      {head + points + "3 0 1 3\n", "line 13: a face names vertex 3, of 3"},
+      {head + points + "3 0 1 -1\n", "line 13: a face names vertex -1"},
+      {head + points + "-3 0 1 2\n", "line 13: a list of no sound length"},
+      {head + points + "1e9 0 1 2\n", "line 13: a list of no sound length"},
+      {head + points + "2 0 1\n", "line 13: a face of fewer than three corners"},
+      {head + points, "the file ends after 0 of 1 face"},
+      {head, "the header has no end"},
+      {"ply\nelement vertex 0\nend_header\n", "the header names no format"},
+      {"ply\nformat binary_middle_endian 1.0\nend_header\n", "line 2: the format is none of"},
+      {"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "line 3: a property before the first element"},
+      {"ply\nformat ascii 1.0\nelement vertex 1\nproperty text x\nend_header\n", "line 4: a property of no known type"},
+      {"PLY\n", "does not begin with \"ply\""},
+      {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "no x, y and z"},
+      {head + "end_header\n0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n", "line 10: a vertex that is not finite"},
+  };
+  for (const auto& [text, wanted] : bad) EXPECT_THAT(message(text), testing::HasSubstr(wanted)) << text;
 }
 
 TEST_F(Files, AsciiStlIsReadHoweverItIsWritten) {

@@ -17,8 +17,8 @@
 #include "feeler/policies/io/lattice_problem_file.h"
 #include "feeler/policies/io/policy_blob.h"
 #include "feeler/policies/io/policy_json.h"
-#include "feeler/policies/io/pomdp_export.h"
 #include "tests/fuzz/readers.h"
+#include "tests/planner/pomdp/rover.h"
 
 namespace feeler::fuzz {
 namespace {
@@ -87,7 +87,9 @@ std::string TigerPolicy(std::string_view form) {
   planner::PomdpSolverOptions options;
   options.kind = planner::PomdpSolverKind::kPointBased;
   options.expansion_limit = 200;
-  const planner::PomdpResult result = planner::SolvePomdp(tiger, options);
+  planner::PomdpResult result = planner::SolvePomdp(tiger, options);
+  constexpr std::size_t kVectors = 8;  // mutations are to hit more than numbers
+  if (result.alphas.size() > kVectors) result.alphas.resize(kVectors);
   if (form == "controller") return policies::FormatController(tiger, *result.controller, result.value_lower);
   return form == "alpha" ? planner::FormatAlpha(tiger, result.alphas) : planner::FormatPolicyx(tiger, result.alphas);
 }
@@ -143,8 +145,8 @@ std::vector<std::string> Seeds(const Reader& reader) {
   if (name == "table") return {Table()};
   if (name == "pomdp") return {TigerText()};
   if (name == "pomdpx") {
-    const auto slot = policies::ReadLatticeProblem(FEELER_SOURCE_DIR "/tests/data/slot2d.json");
-    return {policies::FormatPomdpx(planner::MakeLatticeProblem(slot))};
+    return {planner::Rover(planner::kTableTransitions, planner::kTableSensor),
+            planner::Rover(planner::kDiagramTransitions, planner::kDiagramSensor)};
   }
   if (name == "controller" || name == "alpha" || name == "policyx") return {TigerPolicy(name)};
   if (name == "contact_map") return {SmallContactMap()};
