@@ -22,6 +22,8 @@ constexpr double kAlong = 0.9;
 constexpr int kStartled = 2;
 /// Of the budget: a force that stops a compliant motion rises on until the robot has stopped.
 constexpr double kPressShare = 0.95;
+/// A shorter way that is free is not worth a motion of its own, cells.
+constexpr double kLeastFree = 1.0;
 /// A target that stands higher than all hypotheses is met on the first way along the insertion, where contacts are
 /// hardest: this costs a tenth of a second.
 constexpr double kUnfelt_m_s = 0.08;
@@ -122,6 +124,12 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
     if (rest) rest = {(*predicted)[0] - gone, (*predicted)[1] - gone};
     const MotionReport outside = FastOnce(*free, kind, {}, FreeBy::kBelief);
     return outside.contact ? outside : Fast(target, kind, rest, free_by);
+  }
+  if (record_.startled > 0) {
+    for (const Eigen::Vector3d& via : WayOver(target)) {
+      const MotionReport leg = FastOnce(via, kind, {}, free_by);
+      if (leg.contact) return leg;
+    }
   }
   MotionReport report = FastOnce(target, kind, predicted, free_by);
   for (int i = 0; doubts_ && report.contact && i < kMostFalse; ++i) {
@@ -244,15 +252,31 @@ bool Mover::StaysOut(const Eigen::Vector3d& target) const {
 }
 
 std::optional<Eigen::Vector3d> Mover::EndOfFreeWay(const Eigen::Vector3d& target) const {
-  constexpr double kLeast = 1.0;  // a shorter way is not worth a motion of its own
   const Eigen::Vector3d way = target - position_;
   if (!outmost_ || way.isZero() || DirectionOf(way) != outmost_->first) return std::nullopt;
   const int axis = AxisOf(outmost_->first);
   const double out = -SignOf(outmost_->first);
-  if (out * (position_[axis] - outmost_->second) < kLeast || out * (outmost_->second - target[axis]) <= 0.0) {
+  if (out * (position_[axis] - outmost_->second) < kLeastFree || out * (outmost_->second - target[axis]) <= 0.0) {
     return std::nullopt;
   }
   return Eigen::Vector3d(position_ + way * ((outmost_->second - position_[axis]) / way[axis]));
+}
+
+std::vector<Eigen::Vector3d> Mover::WayOver(const Eigen::Vector3d& target) const {
+  constexpr double kLonger = 1.3;  // than all of it that is still slow
+  if (!outmost_) return {};
+  const int axis = AxisOf(outmost_->first);
+  const double out = -SignOf(outmost_->first);
+  const double rise = out * (outmost_->second - position_[axis]);
+  const double fall = std::max(0.0, out * (outmost_->second - target[axis]));
+  if (rise <= 0.0 || (target - position_).norm() < kLonger * (rise + fall)) return {};
+  std::vector<Eigen::Vector3d> way{position_};
+  way.back()[axis] = outmost_->second;
+  if (fall > 0.0) {
+    way.push_back(target);
+    way.back()[axis] = outmost_->second;
+  }
+  return way;
 }
 
 double Mover::SpeedInto(const Eigen::Vector3d& direction, bool held) const {

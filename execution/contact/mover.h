@@ -97,7 +97,8 @@ class Mover {
   /// are no faster than kUnfelt_m_s.
   void KeepLowInto(std::optional<Direction> insertion) { unfelt_ = insertion; }
   /// Nothing of the target stands farther out, against `insertion`, than this coordinate along it, which was felt: ways
-  /// that stay out there are free whatever surprised the tool below, and ways straight in are so up to there.
+  /// that stay out there are free whatever surprised the tool below, and ways straight in are so up to there. After a
+  /// surprise long ways pass by there.
   void KeepClearOf(Direction insertion, double outmost) { outmost_ = {insertion, outmost}; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
@@ -117,6 +118,9 @@ class Mover {
   bool StaysOut(const Eigen::Vector3d& target) const;
   /// Where a way straight in comes to what KeepClearOf tells; empty if it does not, or begins there.
   std::optional<Eigen::Vector3d> EndOfFreeWay(const Eigen::Vector3d& target) const;
+  /// The way points of a way by way of what KeepClearOf tells: straight out to there, over, and straight in again;
+  /// empty where the direct way is not much longer than what is slow of it.
+  std::vector<Eigen::Vector3d> WayOver(const Eigen::Vector3d& target) const;
   void CheckLimits() const;
   /// Logs a motion and turns it into a report. `shortfall`: ending short of `target` counts as contact.
   MotionReport Finish(const MotionResult& result, const Eigen::Vector3d& target, const std::string& kind,

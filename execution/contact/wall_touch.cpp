@@ -19,6 +19,9 @@ constexpr double kFarthestWall = 2.5;
 constexpr double kOffWall = 0.25;
 /// A wall that is not where it was expected is looked for within so many times the slack.
 constexpr double kFartherOff = 2.0;
+/// After a touch the tool goes as far off as the wall may be off, within these, cells.
+constexpr double kLeastOff = 1.0;
+constexpr double kMostOff = 4.0;
 /// Lines that meet the same wall differ by less than this.
 constexpr double kSameTravel = 0.2;
 
@@ -102,7 +105,9 @@ std::optional<double> TouchWall(const planner::ContactMap& map, const Eigen::Vec
       mover.Probe(wall.direction, from + sign * (travel + slack), kind, std::array<double, 2>{travel, travel});
   const double met = report.end[axis];
   const double travelled = sign * (met - from);
-  mover.Retreat(report.end - std::min(1.0, std::max(0.3, travelled)) * UnitVector(wall.direction));
+  // Along the wall, which may be turned, goes on what comes next.
+  const double off = std::clamp(slack, kLeastOff, kMostOff);
+  mover.Retreat(report.end - std::min(off, std::max(0.3, travelled)) * UnitVector(wall.direction));
   if (!report.contact || travelled < travel - slack) return std::nullopt;
   return met;
 }

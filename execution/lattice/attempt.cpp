@@ -149,6 +149,9 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
     attempt.reason = "touches that agree on no place";
     return;
   }
+  if (const auto outmost = Outmost(task, *problem.map, attempt)) {
+    mover.KeepClearOf(task.insertion, (*attempt.target)[AxisOf(task.insertion)] + *outmost);
+  }
   const BelievedInsertion verdict =
       ApproachAndInsert(task, *problem.map, *attempt.target, attempt.orientation, mover, attempt.evidence);
   const bool localized = record.believed_localized;
@@ -166,6 +169,34 @@ Cell CellsBeyond(const Task& task) {
   }
   // An axis that counts as certain is off by a little of what the others are.
   return beyond.cwiseMax(1);
+}
+
+std::optional<double> Outmost(const Task& task, const planner::ContactMap& map, const Attempt& attempt) {
+  if (!attempt.target) return std::nullopt;
+  const bool felt = std::any_of(attempt.evidence.begin(), attempt.evidence.end(), [&](const Touch& touch) {
+    return touch.contact && !touch.is_oblique() && touch.direction == task.insertion;
+  });
+  if (!felt) return std::nullopt;
+  constexpr double kRoom = 1.5;  // what is blocked ends within a cell of the last that is
+  const int axis = AxisOf(task.insertion);
+  const int out = -SignOf(task.insertion);
+  const CellBox& box = map.domain();
+  for (int place = out > 0 ? box.max[axis] : box.min[axis]; box.min[axis] <= place && place <= box.max[axis];
+       place -= out) {
+    Cell least = box.min;
+    Cell most = box.max;
+    least[axis] = most[axis] = place;
+    for (int x = least.x(); x <= most.x(); ++x) {
+      for (int y = least.y(); y <= most.y(); ++y) {
+        for (int z = least.z(); z <= most.z(); ++z) {
+          if (map.Blocked({x, y, z}, attempt.orientation)) {
+            return place + map.phase()[axis] + out * kRoom;
+          }
+        }
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 void Conclude(const Episode& episode, const LatticeFrame& frame, const Eigen::Vector3d& target,

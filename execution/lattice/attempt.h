@@ -45,6 +45,7 @@ struct Attempt {
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< half width of what the last refit leaves, per axis, cells
   bool sure = false;    ///< the fit explains every touch, and a contact pins each axis across the insertion
   bool tried = false;   ///< the tool was pushed at the target
+  bool astray = false;  ///< no place explains the touches: `target` is the one that explains most of them
   bool turned = false;  ///< the frame is turned as the target was felt to be: `spread` says how well it is placed
   int orientation = 0;
 };
@@ -58,6 +59,10 @@ LatticeFrame FrameOf(const Task& task, const planner::Problem& problem, const Po
 /// anything of the target stands, cells, where that was felt (Mover::KeepClearOf).
 Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, const Pose& world_T_estimate,
                    policies::Policy& policy, std::optional<double> outmost = {});
+
+/// How far out from its mouth anything of the target stands, along the axis of the insertion, a cell of room included;
+/// known once a contact along the insertion has told how high the target stands.
+std::optional<double> Outmost(const Task& task, const planner::ContactMap& map, const Attempt& attempt);
 
 /// The fit explains every touch, and a contact pins each axis across the insertion.
 bool IsSure(const Task& task, const TargetFit& fit);

@@ -34,6 +34,7 @@ constexpr double kSweepMost_rad = 6.0 * kDegree;
 constexpr double kCentreOff = 1.25;
 /// Of a start belief along an axis, as problems are made for.
 constexpr int kMostCells = 64;
+constexpr const char* kNoSides = "yaw fit: the sides of the target are not where they should be";
 /// The tool comes off the mouth by this before it goes elsewhere, cells.
 constexpr double kOff = 1.5;
 
@@ -43,36 +44,6 @@ void Log(const Episode& episode, const char* rung, std::string reason) {
 
 Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
   return {episode.robot, frame, episode.options, episode.record, episode.started_s};
-}
-
-/// How far out from its mouth anything of the target stands, along the axis of the insertion, a cell of room included;
-/// known once a contact along the insertion has told how high the target stands.
-std::optional<double> Outmost(const Task& task, const planner::ContactMap& map, const Attempt& attempt) {
-  if (!attempt.target) return std::nullopt;
-  const bool felt = std::any_of(attempt.evidence.begin(), attempt.evidence.end(), [&](const Touch& touch) {
-    return touch.contact && !touch.is_oblique() && touch.direction == task.insertion;
-  });
-  if (!felt) return std::nullopt;
-  constexpr double kRoom = 1.5;  // what is blocked ends within a cell of the last that is
-  const int axis = AxisOf(task.insertion);
-  const int out = -SignOf(task.insertion);
-  const CellBox& box = map.domain();
-  for (int place = out > 0 ? box.max[axis] : box.min[axis]; box.min[axis] <= place && place <= box.max[axis];
-       place -= out) {
-    Cell least = box.min;
-    Cell most = box.max;
-    least[axis] = most[axis] = place;
-    for (int x = least.x(); x <= most.x(); ++x) {
-      for (int y = least.y(); y <= most.y(); ++y) {
-        for (int z = least.z(); z <= most.z(); ++z) {
-          if (map.Blocked({x, y, z}, attempt.orientation)) {
-            return place + map.phase()[axis] + out * kRoom;
-          }
-        }
-      }
-    }
-  }
-  return std::nullopt;
 }
 
 /// Off whatever the tool stands on, straight out of the opening.
@@ -97,7 +68,8 @@ void Refit(const Episode& episode, const planner::Problem& problem, Attempt& att
   attempt.target = fit.position;
   attempt.spread = fit.half_width;
   attempt.sure = false;
-  if (fit.violations > 0) {
+  attempt.astray = fit.violations > 0;
+  if (attempt.astray) {
     // As for a turned target, which can be felt.
     attempt.end = AttemptEnd::kBlocked;
     return;
@@ -180,7 +152,7 @@ void InsertRecentred(const Episode& episode, const planner::Problem& problem, do
     attempt.sure = centre.has_value();
     if (!centre) {
       attempt.end = AttemptEnd::kLost;
-      attempt.reason = "yaw fit: the sides of the target are not where they should be";
+      attempt.reason = kNoSides;
       return;
     }
     Conclude(episode, attempt.frame, *centre,
@@ -188,6 +160,23 @@ void InsertRecentred(const Episode& episode, const planner::Problem& problem, do
     if (attempt.end != AttemptEnd::kBlocked) return;
     if (sides == Sides::kNearest) ComeOff(task, *centre, mover);
   }
+}
+
+/// A side along each axis, wherever the target may be. False, with the attempt lost, if there is none.
+bool FindSides(const Task& task, const planner::ContactMap& map, Mover& mover, Attempt& attempt) {
+  const Eigen::Vector3d beyond = CellsBeyond(task).cast<double>();
+  Eigen::Vector3d farthest =
+      (*attempt.target - attempt.possible.lower + beyond).cwiseMax(attempt.possible.upper + beyond - *attempt.target);
+  farthest[AxisOf(task.insertion)] = 0.0;
+  const auto centre =
+      Recenter(task, map, *attempt.target, attempt.orientation, Sides::kNearest, farthest.maxCoeff(), mover);
+  if (centre) {
+    attempt.target = centre;
+    return true;
+  }
+  attempt.end = AttemptEnd::kLost;
+  attempt.reason = kNoSides;
+  return false;
 }
 
 /// Feels how far the target is turned; from then on the frame of the attempt is turned with it. Leaves the attempt lost
@@ -200,6 +189,7 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
     mover.KeepClearOf(task.insertion, (*attempt.target)[AxisOf(task.insertion)] + *outmost);
   }
   ComeOff(task, *attempt.target, mover);
+  if (attempt.astray && !FindSides(task, map, mover, attempt)) return;
   const std::optional<YawFit> fit =
       MeasureYaw(task, map, *attempt.target, attempt.orientation, mover, attempt.evidence);
   const bool sound = fit && std::abs(fit->yaw_rad) <= kLargestTurn_rad;

@@ -170,8 +170,8 @@ TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
   mover.KeepClearOf(Direction::kMinusZ, 5.0);
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 5.5}), fast_m_s);
   EXPECT_LT(speed_to(mover, {20.0, 0.0, 4.5}), fast_m_s) << "down into it";
-  EXPECT_LT(speed_to(mover, {20.0, 9.0, 4.5}), fast_m_s) << "below";
-  EXPECT_LT(speed_to(mover, {20.0, 9.0, 8.0}), fast_m_s) << "out of it";
+  EXPECT_LT(speed_to(mover, {20.5, 0.0, 4.5}), fast_m_s) << "below";
+  EXPECT_LT(speed_to(mover, {20.5, 0.6, 5.0}), fast_m_s) << "out of it";
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 8.0}), fast_m_s);
   // Out is against the insertion, along any axis.
   mover.KeepClearOf(Direction::kPlusX, 30.0);
@@ -208,6 +208,34 @@ TEST(Mover, GoesFastDownToWhatItIsToKeepClearOf) {
   count = bench.robot.speeds_m_s.size();
   mover.Fast({20.0, 0.0, 2.0}, "transfer");
   EXPECT_EQ(bench.robot.speeds_m_s.size(), count + 1);
+}
+
+// After a surprise a long way beside the target goes out, over and in: only what lies below is slow. A short one, one
+// that stays below by much, or one without a surprise goes straight.
+TEST(Mover, LongWaysAfterASurprisePassOverTheTarget) {
+  const auto ways = [](int startled, const Eigen::Vector3d& to) {
+    Bench bench(1.0);
+    bench.robot.meets = false;
+    bench.record.startled = startled;
+    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    mover.KeepClearOf(Direction::kMinusZ, 3.0);
+    EXPECT_FALSE(mover.Fast(to, "transfer").contact);
+    EXPECT_EQ(mover.position(), to);
+    return bench.robot.speeds_m_s;
+  };
+  const double fast_m_s = ExecutorOptions{}.transfer_speed_m_s;
+  const std::vector<double> over = ways(2, {20.0, 5.0, 1.0});
+  ASSERT_EQ(over.size(), 3u);
+  EXPECT_LT(over[0], fast_m_s);
+  EXPECT_EQ(over[1], fast_m_s);
+  EXPECT_LT(over[2], fast_m_s);
+  const std::vector<double> out = ways(2, {20.0, 0.0, 4.0});
+  ASSERT_EQ(out.size(), 2u);
+  EXPECT_LT(out[0], fast_m_s);
+  EXPECT_EQ(out[1], fast_m_s);
+  EXPECT_EQ(ways(2, {4.0, 0.0, 0.0}).size(), 1u) << "short";
+  EXPECT_EQ(ways(2, {20.0, 0.0, -15.0}).size(), 1u) << "deep";
+  EXPECT_EQ(ways(0, {20.0, 5.0, 1.0}).size(), 1u) << "no surprise";
 }
 
 // The robot of the bench says so where one is none: after a surprise ways are judged at edges slanted to them.
