@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "feeler/cad/readers/lines.h"
+#include "feeler/cad/readers/read_apart.h"
 #include "feeler/cad/readers/read_obj.h"
 #include "feeler/cad/readers/read_ply.h"
 #include "feeler/cad/readers/read_stl.h"
@@ -43,12 +44,12 @@ void RequireModest(const fs::path& file, const std::string& extension) {
   if (triangles > kMostTriangles) TooMany(file, triangles);
 }
 
-RawPart Read3mf(const fs::path& file) {
+RawPart Read3mfHere(const fs::path& file) {
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_LINE | aiPrimitiveType_POINT);
   const aiScene* scene =
       importer.ReadFile(file.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices);
-  if (scene == nullptr) throw InputError(file.string(), importer.GetErrorString(), "export it again, or as STL");
+  if (scene == nullptr) throw Refusal{importer.GetErrorString(), "export it again, or as STL"};
   RawPart part{"3MF", {}, ParseUnit("mm")};  // what the format means where it does not say another
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
     const aiMesh& mesh = *scene->mMeshes[m];
@@ -71,6 +72,10 @@ RawPart Read3mf(const fs::path& file) {
     part.unit_is_stated = true;
   }
   return part;
+}
+
+RawPart Read3mf(const fs::path& file) {
+  return ReadApart(file, "assimp", [&] { return Read3mfHere(file); });
 }
 
 RawPart ReadAll(const fs::path& file, const StepReader& step) {

@@ -30,15 +30,10 @@
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <cmath>
-#include <cstring>
-#include <exception>
-#include <new>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include "feeler/cad/step/run_apart.h"
-#include "feeler/core/error.h"
+#include "feeler/cad/readers/read_apart.h"
 
 namespace feeler::cad {
 namespace {
@@ -143,12 +138,6 @@ std::string NameOf(STEPControl_Reader& reader, const TopoDS_Shape& solid) {
   return item->Name()->ToCString();
 }
 
-/// Why a file is not read, and how to mend it.
-struct Refusal {
-  std::string what;
-  std::string mend;
-};
-
 RawPart ReadHere(const std::filesystem::path& file, double deflection_mm, double angle_rad) {
   try {
     Message::DefaultMessenger()->ChangePrinters().Clear();  // it writes to stdout
@@ -173,98 +162,10 @@ RawPart ReadHere(const std::filesystem::path& file, double deflection_mm, double
   }
 }
 
-void Put(std::string& bytes, const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
-void Put(std::string& bytes, const std::string& text) {
-  const std::size_t size = text.size();
-  Put(bytes, &size, sizeof size);
-  bytes += text;
-}
-
-template <typename T>
-void PutAll(std::string& bytes, const std::vector<T>& values) {
-  const std::size_t count = values.size();
-  Put(bytes, &count, sizeof count);
-  Put(bytes, values.data(), count * sizeof(T));
-}
-
-void PutRefusal(std::string& bytes, const Refusal& refusal) {
-  bytes.clear();
-  Put(bytes, refusal.what);
-  Put(bytes, refusal.mend);
-}
-
-/// Takes apart what Put has written.
-class Parts {
- public:
-  explicit Parts(const std::string& bytes) : bytes_(bytes) {}
-  void Get(void* data, std::size_t size) {
-    if (size == 0) return;
-    std::memcpy(data, bytes_.data() + at_, size);
-    at_ += size;
-  }
-  std::size_t Size() {
-    std::size_t size = 0;
-    Get(&size, sizeof size);
-    return size;
-  }
-  template <typename T>
-  void All(std::vector<T>& values) {
-    values.resize(Size());
-    Get(values.data(), values.size() * sizeof(T));
-  }
-  std::string Text() {
-    std::string text(Size(), '\0');
-    Get(text.data(), text.size());
-    return text;
-  }
-  bool done() const { return at_ >= bytes_.size(); }
-
- private:
-  const std::string& bytes_;
-  std::size_t at_ = 0;
-};
-
-std::string Pack(const std::filesystem::path& file, double deflection_mm, double angle_rad) {
-  std::string bytes;
-  try {
-    const RawPart part = ReadHere(file, deflection_mm, angle_rad);
-    Put(bytes, std::string());
-    for (const RawBody& body : part.bodies) {
-      Put(bytes, body.name);
-      PutAll(bytes, body.mesh.points);
-      PutAll(bytes, body.mesh.triangles);
-    }
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& error) {
-    PutRefusal(bytes, {fmt::format("Open CASCADE fails: {}", error.what()), "export it again, or as STL"});
-  } catch (const Refusal& refusal) {
-    PutRefusal(bytes, refusal);
-  }
-  return bytes;
-}
-
 }  // namespace
 
 RawPart ReadStep(const std::filesystem::path& file, double deflection_mm, double angle_rad) {
-  std::string bytes;
-  try {
-    bytes = RunApart([&] { return Pack(file, deflection_mm, angle_rad); });
-  } catch (const ChildDied& died) {
-    throw InputError(file.string(), fmt::format("Open CASCADE dies of it (signal {})", died.signal),
-                     "export it again, or as STL");
-  }
-  Parts parts(bytes);
-  const std::string refused = parts.Text();
-  if (!refused.empty()) throw InputError(file.string(), refused, parts.Text());
-  RawPart part{"STEP", {}, ParseUnit("mm"), true, {}};
-  while (!parts.done()) {
-    RawBody body{parts.Text(), {}, {}};
-    parts.All(body.mesh.points);
-    parts.All(body.mesh.triangles);
-    part.bodies.push_back(std::move(body));
-  }
-  return part;
+  return ReadApart(file, "Open CASCADE", [&] { return ReadHere(file, deflection_mm, angle_rad); });
 }
 
 }  // namespace feeler::cad

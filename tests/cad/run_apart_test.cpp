@@ -1,6 +1,6 @@
 // Laws of work in a process of its own: what it gives arrives whole; what kills it kills nothing else, and is named; a
 // signal to the one who waits ends both.
-#include "feeler/cad/step/run_apart.h"
+#include "feeler/cad/readers/run_apart.h"
 
 #include <gtest/gtest.h>
 #include <pthread.h>

@@ -19,6 +19,7 @@
 #include "feeler/policies/storage/database.h"
 #include "feeler/policies/storage/task_bundle.h"
 #include "feeler/workflow/assembly/assembly.h"
+#include "tests/cad/kinds/part_shapes.h"
 #include "tests/env/task_text.h"
 #include "tests/fuzz/readers.h"
 
@@ -93,10 +94,11 @@ constexpr std::array kMoreReaders{
     Reader{"task", Task, true},
     Reader{"urdf", Urdf, true},
     Reader{"database", Database, true},
-    Reader{"stl", [](std::string_view b) { Mesh(b, "input.stl"); }, true},
-    Reader{"obj", [](std::string_view b) { Mesh(b, "input.obj"); }, true},
-    Reader{"ply", [](std::string_view b) { Mesh(b, "input.ply"); }, true},
-    Reader{"step", Step, true}};
+    Reader{"stl", [](std::string_view b) { Mesh(b, "input.stl"); }},
+    Reader{"obj", [](std::string_view b) { Mesh(b, "input.obj"); }},
+    Reader{"3mf", [](std::string_view b) { Mesh(b, "input.3mf"); }},
+    Reader{"ply", [](std::string_view b) { Mesh(b, "input.ply"); }},
+    Reader{"step", Step}};
 
 /// A database of one problem, or the bundle of its task.
 std::string SmallDatabase(bool bundle) {
@@ -169,12 +171,10 @@ std::vector<std::string> MoreSeeds(const Reader& reader) {
   if (name == "assembly") return {Slurp(FindData("models") / "assemblies/frame.json")};
   if (name == "urdf") return {Slurp(FindData("models") / "robots/ur10e.urdf")};
   if (name == "task") return {env::TaskText().Mjcf()};
-  if (name == "step") {
-    return {
-        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('p','',(''),(''),'','','');\n"
-        "FILE_SCHEMA(('CONFIG_CONTROL_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\n"
-        "#2=DIRECTION('',(0.,0.,1.));\n#3=DIRECTION('',(1.,0.,0.));\n#4=AXIS2_PLACEMENT_3D('',#1,#2,#3);\n"
-        "ENDSEC;\nEND-ISO-10303-21;\n"};
+  if (name == "step" || name == "3mf") {
+    // The smallest of the parts that can be drawn.
+    const cad::PartFiles files = cad::WriteParts("rectangle", Folder(), std::string(name));
+    return {Slurp(files.tool)};
   }
   return Meshes(name);
 }

@@ -1,4 +1,4 @@
-#include "feeler/cad/step/run_apart.h"
+#include "feeler/cad/readers/run_apart.h"
 
 #include <fcntl.h>
 #include <sys/prctl.h>
@@ -17,6 +17,11 @@ namespace feeler::cad {
 namespace {
 
 [[noreturn]] void Serve(int pipe, pid_t parent, const std::function<std::string()>& work) {
+  // What a library has to say is not for who reads our messages.
+  if (const int nowhere = open("/dev/null", O_WRONLY); nowhere >= 0) {
+    dup2(nowhere, STDOUT_FILENO);
+    dup2(nowhere, STDERR_FILENO);
+  }
   // Whoever ends the parent ends this.
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, SIG_DFL);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
