@@ -2,7 +2,7 @@
 """Mutation run: would the tests notice?
 
 Flips one operator or constant of a source file at a time, builds the tests of its room and runs them. A mutant is
-*killed* if the tests fail, crash or hang, *invalid* if it does not compile, *alive* if all tests pass: then nothing
+*killed* if the tests fail, crash or hang (those in the folder of the same name run first), *invalid* if it does not compile, *alive* if all tests pass: then nothing
 asserts what the flipped token decides. The score is killed / (killed + alive).
 
     tests/mutation/mutate.py --build build --sample 40 --seed 1 planner/search planner/policy execution
@@ -75,6 +75,16 @@ def run(command, timeout):
         return None
 
 
+SUITE = re.compile(r"^(?:TEST|TEST_F|TEST_P|TYPED_TEST)\((\w+),", re.M)
+
+
+def near(path):
+    """Filter of the suites that stand in the tests' folder of the same name: they notice first."""
+    folder = ROOT / "tests" / path.relative_to(ROOT).parent
+    suites = sorted({suite for file in folder.glob("*.cpp") for suite in SUITE.findall(file.read_text())})
+    return ":".join(f"{suite}.*:*/{suite}.*:{suite}/*" for suite in suites)
+
+
 def judge(mutant, build, timeout, test_filter):
     path, number, column, old, new = mutant
     original = path.read_text()
@@ -87,9 +97,10 @@ def judge(mutant, build, timeout, test_filter):
         path.write_text("\n".join(lines))
         if run(["ninja", "-C", str(build), target], 3600) != 0:
             return "invalid"
-        code = run([str(build / target), f"--gtest_filter={test_filter or default_filter}", "--gtest_fail_fast"],
-                   timeout)
-        return "alive" if code == 0 else "killed"
+        for tests in filter(None, [test_filter] if test_filter else [near(path), default_filter]):
+            if run([str(build / target), f"--gtest_filter={tests}", "--gtest_fail_fast"], timeout) != 0:
+                return "killed"
+        return "alive"
     finally:
         path.write_text(original)
 
