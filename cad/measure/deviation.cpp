@@ -8,6 +8,7 @@
 
 #include "feeler/cad/measure/sliding.h"
 #include "feeler/cad/pieces/clip.h"
+#include "feeler/cad/pieces/piece_union.h"
 #include "feeler/core/random.h"
 
 namespace feeler::cad {
@@ -109,15 +110,6 @@ Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const s
   return best;
 }
 
-double DistanceToUnion(const std::vector<const ConvexPiece*>& pieces, const Eigen::Vector3d& p) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const ConvexPiece* piece : pieces) {
-    if (piece->bounds.squaredExteriorDistance(p) >= best * best) continue;
-    best = std::min(best, DistanceTo(*piece, p));
-  }
-  return best;
-}
-
 /// What pieces, grown by `grow_m`, leave uncovered of a triangle.
 std::vector<Polygon3> Uncovered(const Polygon3& triangle, const std::vector<ConvexPiece>& pieces, double grow_m) {
   Box box;
@@ -136,54 +128,66 @@ std::vector<Polygon3> Uncovered(const Polygon3& triangle, const std::vector<Conv
   return rest;
 }
 
-/// The farthest that the part's surface is from the pieces. The distance to a convex piece is a convex function, so
-/// that on a patch the largest distance to the union is at most the smallest, over the pieces, of the largest at its
-/// corners.
-Best Lost(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
-          double accuracy_m) {
-  Best best;
-  std::priority_queue<Patch> queue;
-  std::vector<const ConvexPiece*> all;
-  for (const ConvexPiece& piece : pieces) all.push_back(&piece);
-  const auto judge = [&](Patch patch) {
+/// The farthest that the part's surface is from the pieces: first at its corners, then what lies between them, as far
+/// as some piece alone does not tell that it is no farther (PieceUnion::LargestFromOne).
+class Losses {
+ public:
+  Losses(const std::vector<ConvexPiece>& pieces, double accuracy_m)
+      : pieces_(pieces), union_(pieces), accuracy_m_(accuracy_m) {}
+
+  Best Of(const TriangleMesh& mesh, const std::optional<Box>& zone) {
+    std::vector<Polygon3> faces;
+    for (int t = 0; t < mesh.size(); ++t) {
+      Polygon3 face{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
+      if (zone) face = ClipToBox(std::move(face), *zone);
+      if (face.size() < 3) continue;
+      for (const Eigen::Vector3d& corner : face) Offer(corner);
+      faces.push_back(std::move(face));
+    }
+    for (const Polygon3& face : faces) {
+      const double enough_m = best_.value + accuracy_m_;
+      if (union_.LargestFromOne(face, std::numeric_limits<double>::infinity()) <= enough_m) continue;
+      for (const Polygon3& rest : Uncovered(face, pieces_, accuracy_m_)) {
+        for (std::size_t k = 1; k + 1 < rest.size(); ++k) Judge({{rest[0], rest[k], rest[k + 1]}, 0});
+      }
+    }
+    for (int cut = 0; cut < kMostPatches && !queue_.empty(); ++cut) {
+      const Patch patch = queue_.top();
+      queue_.pop();
+      if (patch.bound <= best_.value + accuracy_m_) break;
+      for (const auto& half : Halves(patch.corners)) Judge({half, 0});
+    }
+    if (!queue_.empty() && queue_.top().bound > best_.value + accuracy_m_) best_.value = queue_.top().bound;
+    return best_;
+  }
+
+ private:
+  /// What is within the accuracy is taken for nothing: rounding, most of it.
+  double Offer(const Eigen::Vector3d& p) {
+    const double distance_m = union_.Distance(p);
+    if (distance_m > accuracy_m_) best_.Offer(distance_m, p);
+    return distance_m;
+  }
+
+  void Judge(Patch patch) {
     double radius = 0;
     const Eigen::Vector3d center = (patch.corners[0] + patch.corners[1] + patch.corners[2]) / 3;
     for (const Eigen::Vector3d& corner : patch.corners) {
-      best.Offer(DistanceToUnion(all, corner), corner);
+      Offer(corner);
       radius = std::max(radius, (corner - center).norm());
     }
-    const double here = DistanceToUnion(all, center);
-    best.Offer(here, center);
-    patch.bound = here + radius;
-    for (const ConvexPiece* piece : all) {
-      if (piece->bounds.squaredExteriorDistance(center) > patch.bound * patch.bound) continue;
-      double worst = 0;
-      for (const Eigen::Vector3d& corner : patch.corners) {
-        worst = std::max(worst, DistanceTo(*piece, corner));
-        if (worst >= patch.bound) break;  // this piece tells nothing
-      }
-      patch.bound = std::min(patch.bound, worst);
-    }
-    if (patch.bound > best.value + accuracy_m) queue.push(patch);
-  };
-  const TriangleMesh& mesh = part.mesh();
-  for (int t = 0; t < mesh.size(); ++t) {
-    Polygon3 triangle{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
-    if (zone) triangle = ClipToBox(std::move(triangle), *zone);
-    if (triangle.size() < 3) continue;
-    for (const Polygon3& rest : Uncovered(triangle, pieces, accuracy_m)) {
-      for (std::size_t k = 1; k + 1 < rest.size(); ++k) judge({{rest[0], rest[k], rest[k + 1]}, 0});
-    }
+    patch.bound = Offer(center) + radius;
+    if (patch.bound <= best_.value + accuracy_m_) return;
+    patch.bound = union_.LargestFromOne({patch.corners.begin(), patch.corners.end()}, patch.bound);
+    if (patch.bound > best_.value + accuracy_m_) queue_.push(patch);
   }
-  for (int cut = 0; cut < kMostPatches && !queue.empty(); ++cut) {
-    const Patch patch = queue.top();
-    queue.pop();
-    if (patch.bound <= best.value + accuracy_m) break;
-    for (const auto& half : Halves(patch.corners)) judge({half, 0});
-  }
-  if (!queue.empty() && queue.top().bound > best.value + accuracy_m) best.value = queue.top().bound;
-  return best;
-}
+
+  const std::vector<ConvexPiece>& pieces_;
+  PieceUnion union_;
+  double accuracy_m_;
+  Best best_;
+  std::priority_queue<Patch> queue_;
+};
 
 /// Points drawn evenly on a surface.
 template <class Visit>
@@ -210,7 +214,7 @@ void Sample(const TriangleMesh& mesh, int points, RandomStream& random, const Vi
 Deviation DeviationOf(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
                       double accuracy_m) {
   const Best added = Added(part, pieces, zone, accuracy_m);
-  const Best lost = Lost(part, pieces, zone, accuracy_m);
+  const Best lost = Losses(pieces, accuracy_m).Of(part.mesh(), zone);
   return {added.value, added.at, lost.value, lost.at};
 }
 

@@ -4,12 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace feeler::cad {
 namespace {
-
-constexpr int kLeafSize = 6;
 
 double SquaredDistance(const Box& box, const Eigen::Vector3d& p) { return box.squaredExteriorDistance(p); }
 
@@ -24,6 +21,13 @@ bool RayMeets(const Box& box, const Eigen::Vector3d& p, const Eigen::Vector3d& i
     high = std::min(high, std::max(a, b));
   }
   return low <= high;
+}
+
+std::vector<Box> BoxesOf(const TriangleMesh& mesh) {
+  std::vector<Box> boxes;
+  boxes.reserve(mesh.triangles.size());
+  for (int t = 0; t < mesh.size(); ++t) boxes.push_back(BoundsOf(mesh, t));
+  return boxes;
 }
 
 }  // namespace
@@ -55,64 +59,30 @@ Eigen::Vector3d ClosestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3
   return a + ab * (vb / sum) + ac * (vc / sum);
 }
 
-MeshTree::MeshTree(const TriangleMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
-  std::iota(order_.begin(), order_.end(), 0);
-  centers_.reserve(order_.size());
-  for (int t = 0; t < mesh.size(); ++t) centers_.push_back(BoundsOf(mesh, t).center());
-  nodes_.reserve(order_.size());
-  if (!order_.empty()) Build(0, static_cast<int>(order_.size()));
-}
+MeshTree::MeshTree(const TriangleMesh& mesh) : mesh_(mesh), tree_(BoxesOf(mesh)) {}
 
-int MeshTree::Build(int first, int count) {
-  const int number = static_cast<int>(nodes_.size());
-  nodes_.emplace_back();
-  Box box;
-  Box centers;
-  for (int i = first; i < first + count; ++i) {
-    const int t = order_[static_cast<std::size_t>(i)];
-    box.extend(BoundsOf(mesh_, t));
-    centers.extend(centers_[static_cast<std::size_t>(t)]);
-  }
-  Node node{box, first, count, 0};
-  if (count > kLeafSize) {
-    int axis = 0;
-    centers.sizes().maxCoeff(&axis);
-    const auto begin = order_.begin() + first;
-    const int half = count / 2;
-    std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
-      const double x = centers_[static_cast<std::size_t>(a)][axis];
-      const double y = centers_[static_cast<std::size_t>(b)][axis];
-      return x != y ? x < y : a < b;
-    });
-    node.count = 0;
-    node.first = Build(first, half);
-    node.second = Build(first + half, count - half);
-  }
-  nodes_[static_cast<std::size_t>(number)] = node;
-  return number;
-}
-
-double MeshTree::Distance(const Eigen::Vector3d& p) const {
-  double best = std::numeric_limits<double>::infinity();
-  std::vector<int> stack;
-  if (!nodes_.empty()) stack.push_back(0);
-  while (!stack.empty()) {
-    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
-    stack.pop_back();
+double MeshTree::Distance(const Eigen::Vector3d& p, double most_m) const {
+  const std::vector<BoxTree::Node>& nodes = tree_.nodes();
+  double best = most_m * most_m;
+  std::array<int, 64> stack{};  // the tree halves: it is less than 32 deep
+  std::size_t waiting = 0;
+  if (!nodes.empty()) stack[waiting++] = 0;
+  while (waiting > 0) {
+    const BoxTree::Node& node = nodes[static_cast<std::size_t>(stack[--waiting])];
     if (SquaredDistance(node.box, p) >= best) continue;
     if (node.count > 0) {
       for (int i = node.first; i < node.first + node.count; ++i) {
-        const int t = order_[static_cast<std::size_t>(i)];
+        const int t = tree_.order()[static_cast<std::size_t>(i)];
         const Eigen::Vector3d q = ClosestOnTriangle(p, mesh_.Corner(t, 0), mesh_.Corner(t, 1), mesh_.Corner(t, 2));
         best = std::min(best, (p - q).squaredNorm());
       }
       continue;
     }
-    const double first = SquaredDistance(nodes_[static_cast<std::size_t>(node.first)].box, p);
-    const double second = SquaredDistance(nodes_[static_cast<std::size_t>(node.second)].box, p);
+    const double first = SquaredDistance(nodes[static_cast<std::size_t>(node.first)].box, p);
+    const double second = SquaredDistance(nodes[static_cast<std::size_t>(node.second)].box, p);
     // The nearer child last, so that it is looked at first.
-    stack.push_back(first < second ? node.second : node.first);
-    stack.push_back(first < second ? node.first : node.second);
+    stack[waiting++] = first < second ? node.second : node.first;
+    stack[waiting++] = first < second ? node.first : node.second;
   }
   return std::sqrt(best);
 }
@@ -120,36 +90,25 @@ double MeshTree::Distance(const Eigen::Vector3d& p) const {
 int MeshTree::Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const {
   const Eigen::Vector3d inverse = direction.cwiseInverse();
   int sum = 0;
-  std::vector<int> stack;
-  if (!nodes_.empty()) stack.push_back(0);
-  while (!stack.empty()) {
-    const Node& node = nodes_[static_cast<std::size_t>(stack.back())];
-    stack.pop_back();
-    if (!RayMeets(node.box, p, inverse)) continue;
-    if (node.count == 0) {
-      stack.push_back(node.first);
-      stack.push_back(node.second);
-      continue;
-    }
-    for (int i = node.first; i < node.first + node.count; ++i) {
-      const int t = order_[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d a = mesh_.Corner(t, 0) - p;
-      const Eigen::Vector3d b = mesh_.Corner(t, 1) - p;
-      const Eigen::Vector3d c = mesh_.Corner(t, 2) - p;
-      const double u = direction.dot(b.cross(c));
-      const double v = direction.dot(c.cross(a));
-      const double w = direction.dot(a.cross(b));
-      const bool outward = u > 0 && v > 0 && w > 0;
-      const bool inward = u < 0 && v < 0 && w < 0;
-      if (!outward && !inward) continue;
-      if (a.dot((b - a).cross(c - a)) * (outward ? 1 : -1) > 0) sum += outward ? 1 : -1;
-    }
-  }
+  tree_.Descend([&](const Box& box) { return RayMeets(box, p, inverse); },
+                [&](int t) {
+                  const Eigen::Vector3d a = mesh_.Corner(t, 0) - p;
+                  const Eigen::Vector3d b = mesh_.Corner(t, 1) - p;
+                  const Eigen::Vector3d c = mesh_.Corner(t, 2) - p;
+                  const double u = direction.dot(b.cross(c));
+                  const double v = direction.dot(c.cross(a));
+                  const double w = direction.dot(a.cross(b));
+                  const bool outward = u > 0 && v > 0 && w > 0;
+                  const bool inward = u < 0 && v < 0 && w < 0;
+                  if (!outward && !inward) return true;
+                  if (a.dot((b - a).cross(c - a)) * (outward ? 1 : -1) > 0) sum += outward ? 1 : -1;
+                  return true;
+                });
   return sum;
 }
 
 bool MeshTree::Inside(const Eigen::Vector3d& p) const {
-  if (nodes_.empty() || nodes_.front().box.squaredExteriorDistance(p) > 0) return false;
+  if (tree_.empty() || tree_.nodes().front().box.squaredExteriorDistance(p) > 0) return false;
   static const std::array<Eigen::Vector3d, 3> kDirections = {Eigen::Vector3d(0.4136718, 0.6370233, 0.6504911),
                                                              Eigen::Vector3d(-0.7213402, 0.3091177, 0.6197771),
                                                              Eigen::Vector3d(0.2271903, -0.8534107, -0.4690123)};
@@ -159,31 +118,12 @@ bool MeshTree::Inside(const Eigen::Vector3d& p) const {
 }
 
 void MeshTree::Visit(const Box& box, const std::function<bool(int)>& visit) const {
-  Descend([&](const Box& other) { return other.intersects(box); }, visit);
+  const auto meets = [&](const Box& other) { return other.intersects(box); };
+  tree_.Descend(meets, [&](int t) { return !meets(BoundsOf(mesh_, t)) || visit(t); });
 }
 
 void MeshTree::VisitWhere(const std::function<bool(const Box&)>& meets, const std::function<bool(int)>& visit) const {
-  Descend(meets, visit);
-}
-
-template <class Meets>
-void MeshTree::Descend(const Meets& meets, const std::function<bool(int)>& visit) const {
-  std::array<int, 64> stack{};  // the tree halves: it is less than 32 deep
-  std::size_t waiting = 0;
-  if (!nodes_.empty()) stack[waiting++] = 0;
-  while (waiting > 0) {
-    const Node& node = nodes_[static_cast<std::size_t>(stack[--waiting])];
-    if (!meets(node.box)) continue;
-    if (node.count == 0) {
-      stack[waiting++] = node.second;
-      stack[waiting++] = node.first;
-      continue;
-    }
-    for (int i = node.first; i < node.first + node.count; ++i) {
-      const int t = order_[static_cast<std::size_t>(i)];
-      if (meets(BoundsOf(mesh_, t)) && !visit(t)) return;
-    }
-  }
+  tree_.Descend(meets, [&](int t) { return !meets(BoundsOf(mesh_, t)) || visit(t); });
 }
 
 }  // namespace feeler::cad

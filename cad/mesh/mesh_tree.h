@@ -2,8 +2,9 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <vector>
+#include <limits>
 
+#include "feeler/cad/mesh/box_tree.h"
 #include "feeler/cad/mesh/triangle_mesh.h"
 
 namespace feeler::cad {
@@ -17,8 +18,8 @@ class MeshTree {
  public:
   explicit MeshTree(const TriangleMesh& mesh);
 
-  /// Distance from `p` to the surface, m.
-  double Distance(const Eigen::Vector3d& p) const;
+  /// Distance from `p` to the surface, m; `most_m` where it is no less.
+  double Distance(const Eigen::Vector3d& p, double most_m = std::numeric_limits<double>::infinity()) const;
   /// Whether `p` is inside: a ray crosses the surface outward more often than inward; of three skew rays the majority
   /// decides. Cracks of no width, as where a long edge meets two short ones, do no harm.
   bool Inside(const Eigen::Vector3d& p) const;
@@ -32,21 +33,10 @@ class MeshTree {
   const TriangleMesh& mesh() const { return mesh_; }
 
  private:
-  struct Node {
-    Box box;
-    int first = 0;  ///< of its triangles in order_, for a leaf; else the number of its first child
-    int count = 0;  ///< 0: an inner node, whose second child follows the first one's subtree
-    int second = 0;
-  };
-  template <class Meets>
-  void Descend(const Meets& meets, const std::function<bool(int)>& visit) const;
-  int Build(int first, int count);
   int Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const;
 
   const TriangleMesh& mesh_;
-  std::vector<int> order_;
-  std::vector<Eigen::Vector3d> centers_;
-  std::vector<Node> nodes_;
+  BoxTree tree_;
 };
 
 }  // namespace feeler::cad
