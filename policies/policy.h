@@ -59,6 +59,8 @@ using Decision = std::variant<GuardedMove, Insert, GiveUp, SpiralSearch, Servo>;
 struct Doubt {
   planner::Noise noise;     ///< of single steps
   double confidence = 0.0;  ///< of what the policy declares when it inserts
+  /// A motion may end short although no contact is reported.
+  bool steps_get_lost() const { return noise.missed_contact > 0.0 || noise.slip > 0.0; }
 };
 
 /// Decides the next action from what has been felt so far. One object serves many episodes, one after the other:

@@ -16,7 +16,9 @@ void NoiseOptions::Validate() const {
         std::pair{"torque_noise_nm", torque_noise_nm}, std::pair{"force_bias_n", force_bias_n},
         std::pair{"force_delay_s", force_delay_s}, std::pair{"force_quantum_n", force_quantum_n},
         std::pair{"encoder_noise_rad", encoder_noise_rad}, std::pair{"encoder_jitter_rad", encoder_jitter_rad},
-        std::pair{"false_stops_per_m", false_stops_per_m}, std::pair{"joint_stiffness_nm_rad", joint_stiffness_nm_rad},
+        std::pair{"false_stops_per_m", false_stops_per_m}, std::pair{"missed_contact", missed_contact},
+        std::pair{"spent_step", spent_step}, std::pair{"step_m", step_m},
+        std::pair{"joint_stiffness_nm_rad", joint_stiffness_nm_rad},
         std::pair{"contact_threshold_n", contact_threshold_n}}) {
     if (!(value >= 0) || !std::isfinite(value)) {
       throw InputError("noise " + name, fmt::format("{} is {}", field, value), "give a finite number, zero or more");
@@ -32,6 +34,13 @@ void NoiseOptions::Validate() const {
   if (joint_stiffness_nm_rad > 0 && joint_stiffness_nm_rad < 1e4) {
     throw InputError("noise " + name, fmt::format("joint_stiffness_nm_rad is {}", joint_stiffness_nm_rad),
                      "give 0 (rigid) or 1e4 Nm/rad and more: softer joints need another controller");
+  }
+  for (const auto& [field, value] :
+       {std::pair{"missed_contact", missed_contact}, std::pair{"spent_step", spent_step}}) {
+    if (value >= 1.0) throw InputError("noise " + name, fmt::format("{} is {}", field, value), "give less than 1");
+    if (value > 0.0 && step_m < 1e-5)
+      throw InputError("noise " + name, fmt::format("{} without a step: step_m is {}", field, step_m),
+                       "give the length of a step, 1e-5 m or more");
   }
   if (force_delay_s > 0.1) throw InputError("noise " + name, "force_delay_s is above 0.1 s", "give at most 0.1");
 }

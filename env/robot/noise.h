@@ -24,6 +24,13 @@ struct NoiseOptions {
   /// Expected false contacts per metre of guarded and linear motion that is watched for contact: the motion ends there
   /// with a contact that is none.
   double false_stops_per_m = 0.0;
+  /// Readings of single steps that fail, on the same motions, as planner::Noise has them: a step that is blocked
+  /// reports no contact (the tool stays, the step is spent, and the motion goes on with the steps that are left), and
+  /// one that is free and ends with no false contact is spent while the tool stays. A step that is spent takes its
+  /// time.
+  double missed_contact = 0.0;      ///< probability, below 1
+  double spent_step = 0.0;          ///< probability, below 1
+  double step_m = 0.0;              ///< length of a step; to be given with either of them
   double encoder_noise_rad = 0.0;   ///< standard deviation of a constant offset per joint, drawn once an episode
   double encoder_jitter_rad = 0.0;  ///< standard deviation of each reading
   /// Stiffness of each joint between encoder and link, 0: rigid. The tool gives way under contact and the encoders do

@@ -24,7 +24,9 @@ SimulatedRobot::SimulatedRobot(std::shared_ptr<const Scene> scene, const RobotOp
               .friction = FrictionObserver(options.friction_observer),
               .encoder_random = Nobody(),
               .image_random = Nobody(),
-              .false_stop_random = Nobody()} {
+              .false_stop_random = Nobody(),
+              .spent_step_random = Nobody(),
+              .missed_contact_random = Nobody()} {
   Reset(world_.scene().home_q_rad, world_.scene().task.world_T_target, {}, Nobody());
 }
 
@@ -53,6 +55,8 @@ void SimulatedRobot::Reset(const JointVector& q_rad, const Pose& world_T_target,
                         .encoder_random = RandomStream(sensor_seed, 0, "encoder"),
                         .image_random = RandomStream(sensor_seed, 0, "image"),
                         .false_stop_random = RandomStream(sensor_seed, 0, "false stops"),
+                        .spent_step_random = RandomStream(sensor_seed, 0, "spent steps"),
+                        .missed_contact_random = RandomStream(sensor_seed, 0, "missed contacts"),
                         .encoder_offset = encoder_offset};
   Sense();
   memory_.tool_at_sensing = ToolPose();
@@ -200,6 +204,21 @@ void SimulatedRobot::Hold(MotionResult& result) {
     if (t > 0.01 && twist.head<3>().norm() < options_.settle_speed_m_s) break;
   }
   if (result.reason == StopReason::kReached) result.world_T_tool = ToolPose();
+}
+
+bool SimulatedRobot::Stay(double time_s, MotionResult& result) {
+  JointReference here;
+  here.q_rad = q_rad();
+  for (const double end_s = world_.time_s() + time_s; world_.time_s() < end_s;) {
+    if (world_.time_s() >= memory_.deadline_s) {
+      result.reason = StopReason::kTimeLimit;
+      result.detail = "the time of the episode is over";
+      return false;
+    }
+    TrackStep(here);
+    if (Interrupted(result)) return false;
+  }
+  return true;
 }
 
 bool SimulatedRobot::Interrupted(MotionResult& result) {

@@ -82,6 +82,8 @@ struct RobotMemory {
   RandomStream encoder_random;
   RandomStream image_random;
   RandomStream false_stop_random;
+  RandomStream spent_step_random;
+  RandomStream missed_contact_random;
   JointVector encoder_offset = JointVector::Zero();
   JointVector deflection = JointVector::Zero();  ///< of the elastic joints, beyond what gravity explains
   JointVector measured_q = JointVector::Zero();
@@ -109,6 +111,8 @@ struct RobotState {
 /// The world's failure (unstable physics, a full buffer) ends the motion with kAborted and its reason; so do
 /// all later ones until Reset. Arguments that make no sense (NaN, no direction, no way points) throw InputError and
 /// leave the robot as it was.
+///
+/// Where the noise has steps that fail, straight motions that are watched for contact are made of such (WatchedWay).
 ///
 /// Time passes only inside motions and ZeroWrench. Same calls, same bits.
 class SimulatedRobot : public Robot {
@@ -192,8 +196,13 @@ class SimulatedRobot : public Robot {
   /// With a contact that acts on this mobility of the tool (J M^-1 J^T).
   ContactResponse ResponseOf(const Matrix6& mobility, const Eigen::Vector3d& direction) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);
-  /// A straight motion to `goal` that false contacts end, where the noise has such.
+  /// A straight motion to `goal`, by steps that may fail where the noise says so.
   MotionResult WatchedLine(const Pose& goal, double speed_m_s, double acceleration_m_s2, const Watch& watch);
+  /// Lets the contact that ended a motion be missed as often as the noise says: the tool stays meanwhile, and where no
+  /// step is left the motion has ended without a contact.
+  void MissContact(int steps_left, double step_s, MotionResult& result);
+  /// The joints stay where they are for so long. False: something has ended the motion, which `result` then says.
+  bool Stay(double time_s, MotionResult& result);
   MotionResult Follow(double duration_s, const ReferenceAt& reference_at, const Watch& watch, bool settle);
   /// Integrates a tool twist for one step, slower where the joints do not allow it. Empty: no way on.
   std::optional<JointReference> Advance(const Vector6& wanted, TwistReference& reference, JointVector& q) const;

@@ -9,6 +9,7 @@
 #include "feeler/core/error.h"
 #include "feeler/env/robot/motion_arguments.h"
 #include "feeler/env/robot/simulated_robot.h"
+#include "feeler/env/robot/watched_way.h"
 
 namespace feeler::env {
 
@@ -41,23 +42,41 @@ std::optional<PoseTrajectory> SimulatedRobot::Reachable(const PoseTrajectory& tr
 MotionResult SimulatedRobot::WatchedLine(const Pose& goal, double speed_m_s, double acceleration_m_s2,
                                          const Watch& watch) {
   constexpr double kUnwatched_n = 1e5;  // a contact force that no motion reaches: the way off a wall
-  const double rate = memory_.noise.false_stops_per_m;
-  if (!(rate > 0.0) || watch.tool_force_n >= kUnwatched_n)
+  const NoiseOptions& noise = memory_.noise;
+  const bool steps_fail = noise.false_stops_per_m > 0.0 || noise.missed_contact > 0.0 || noise.spent_step > 0.0;
+  if (!steps_fail || watch.tool_force_n >= kUnwatched_n)
     return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
   const Pose start = ArmPose();
-  const double length_m = (goal.translation() - start.translation()).norm();
-  const double until_false_m = -std::log(1.0 - memory_.false_stop_random.Uniform()) / rate;
-  if (until_false_m >= length_m) return FollowLine(Line(goal, speed_m_s, acceleration_m_s2), watch);
-  const double share = until_false_m / length_m;
+  const Eigen::Vector3d way_m = goal.translation() - start.translation();
+  const double length_m = way_m.norm();
+  const WatchedWay way = DrawWatchedWay(noise, length_m, memory_.false_stop_random, memory_.spent_step_random);
   Pose stop = goal;
-  stop.translation() = start.translation() + share * (goal.translation() - start.translation());
-  stop.linear() = Eigen::Quaterniond(start.linear()).slerp(share, Eigen::Quaterniond(goal.linear())).toRotationMatrix();
+  if (way.advance_m < length_m) {
+    const double share = way.advance_m / length_m;
+    stop.translation() = start.translation() + share * way_m;
+    stop.linear() =
+        Eigen::Quaterniond(start.linear()).slerp(share, Eigen::Quaterniond(goal.linear())).toRotationMatrix();
+  }
   MotionResult result = FollowLine(Line(stop, speed_m_s, acceleration_m_s2), watch);
-  if (result.reason == StopReason::kReached) {
+  if (result.reason == StopReason::kContact) {
+    const double advanced_m = (result.world_T_tool.translation() - start.translation()).norm();
+    MissContact(way.StepsLeft(advanced_m), noise.step_m / speed_m_s, result);
+  } else if (result.reason == StopReason::kReached && Stay(way.spent_m / speed_m_s, result) && way.false_contact) {
     result.reason = StopReason::kContact;
     result.contact = true;
   }
   return result;
+}
+
+void SimulatedRobot::MissContact(int steps_left, double step_s, MotionResult& result) {
+  int missed = 0;
+  while (memory_.noise.missed_contact > 0.0 && missed < steps_left &&
+         memory_.missed_contact_random.Uniform() < memory_.noise.missed_contact) {
+    ++missed;
+  }
+  if (!Stay(missed * step_s, result) || missed < steps_left) return;
+  result.reason = StopReason::kReached;
+  result.contact = false;
 }
 
 MotionResult SimulatedRobot::FollowLine(const PoseTrajectory& wanted, const Watch& watch) {

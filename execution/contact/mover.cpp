@@ -79,8 +79,8 @@ MotionReport Mover::Finish(const MotionResult& result, const Eigen::Vector3d& ta
   report.end = Measure(result.world_T_tool);
   report.reason = result.reason;
   const double travelled = length > 0.0 ? (report.end - before).dot(motion) / length : 0.0;
-  report.contact = result.contact || result.reason == StopReason::kContact ||
-                   (shortfall && (length - travelled) * frame_.cell_m > options_.shortfall_m);
+  report.felt = result.contact || result.reason == StopReason::kContact;
+  report.contact = report.felt || (shortfall && (length - travelled) * frame_.cell_m > options_.shortfall_m);
 
   MoveRecord move;
   move.kind = kind;
@@ -122,21 +122,21 @@ MotionReport Mover::Fast(const Eigen::Vector3d& target, const std::string& kind,
     const double gone = (*free - from).norm();
     PredictedCells rest = predicted;
     if (rest) rest = {(*predicted)[0] - gone, (*predicted)[1] - gone};
-    const MotionReport outside = FastOnce(*free, kind, {}, FreeBy::kBelief);
+    const MotionReport outside = Onward([&] { return FastOnce(*free, kind, {}, FreeBy::kBelief); });
     return outside.contact ? outside : Fast(target, kind, rest, free_by);
   }
   if (record_.startled > 0) {
     for (const Eigen::Vector3d& via : WayOver(target)) {
-      const MotionReport leg = FastOnce(via, kind, {}, free_by);
+      const MotionReport leg = Onward([&] { return FastOnce(via, kind, {}, free_by); });
       if (leg.contact) return leg;
     }
   }
-  MotionReport report = FastOnce(target, kind, predicted, free_by);
+  MotionReport report = Onward([&] { return FastOnce(target, kind, predicted, free_by); });
   for (int i = 0; doubts_ && report.contact && i < kMostFalse; ++i) {
     const Eigen::Vector3d place = report.end;
     const Eigen::Vector3d gone = place - from;
     Retreat(gone.norm() > kComeOff ? Eigen::Vector3d(place - kComeOff * gone.normalized()) : from);
-    report = FastOnce(target, kind, {}, free_by);
+    report = Onward([&] { return FastOnce(target, kind, {}, free_by); });
     if (report.contact && (report.end - place).norm() < kSamePlace) return report;
   }
   if (!report.contact) record_.careful = careful;
@@ -161,19 +161,38 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
   }
   const MotionResult result = robot_.LinearMove(frame_.ToWorld(target), speed_m_s, options_.contact_force_n);
   const MotionReport report = Finish(result, target, kind, predicted, true);
-  if (report.contact) ++record_.contacts;
+  const bool lost = steps_get_lost_ && !report.felt;  // on the way: Onward tells
+  if (report.contact && !lost) ++record_.contacts;
   // Where nothing was to be, or harder than it may be: the next transfer may meet it again, with more way to gain
   // speed.
-  const bool unexpected = !predicted || record_.moves.back().peak_force_n > options_.force_budget_n;
-  if (report.contact && unexpected) {
+  const bool too_hard = record_.moves.back().peak_force_n > options_.force_budget_n;
+  if (report.contact && (too_hard || (!predicted && !lost))) {
     record_.careful = true;
     record_.startled = kStartled;
   }
   return report;
 }
 
+MotionReport Mover::Onward(const std::function<MotionReport()>& motion) const {
+  // One step more may be lost as well: a wall is what stops several motions at one place.
+  constexpr int kAtOnePlace = 3;
+  constexpr double kSamePlace = 0.1;
+  MotionReport report = motion();
+  for (int stopped = 1; steps_get_lost_ && report.contact && !report.felt && stopped < kAtOnePlace;) {
+    const Eigen::Vector3d place = report.end;
+    report = motion();
+    stopped = (report.end - place).norm() < kSamePlace ? stopped + 1 : 1;
+  }
+  return report;
+}
+
 MotionReport Mover::Probe(Direction direction, double coordinate, const std::string& kind,
                           const PredictedCells& predicted, const MayMeet& may_meet) {
+  return Onward([&] { return ProbeOnce(direction, coordinate, kind, predicted, may_meet); });
+}
+
+MotionReport Mover::ProbeOnce(Direction direction, double coordinate, const std::string& kind,
+                              const PredictedCells& predicted, const MayMeet& may_meet) {
   CheckLimits();
   const Eigen::Vector3d from = Measure(robot_.ToolPose());
   position_ = from;

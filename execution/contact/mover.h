@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -32,6 +33,7 @@ class LostTrack : public ExecutionFailure {
 struct MotionReport {
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
   bool contact = false;  ///< by force, or because the motion fell short
+  bool felt = false;     ///< by force: the robot says so
   StopReason reason = StopReason::kReached;
 };
 
@@ -67,8 +69,13 @@ class Mover {
   const ExecutorOptions& options() const { return options_; }
   double Cells(double metres) const { return metres / frame_.cell_m; }
 
-  /// From now on a contact of a fast motion is believed when it comes again at the same place.
-  void DoubtContacts() { doubts_ = true; }
+  /// From now on a contact of a fast motion is believed when it comes again at the same place. Where steps get lost
+  /// (contacts are missed, or steps spent in vain) a motion that ends short without a contact goes on from there, and
+  /// has met something once it gets no farther.
+  void DoubtReadings(bool steps_get_lost) {
+    doubts_ = true;
+    steps_get_lost_ = steps_get_lost;
+  }
 
   /// Fast and straight to `target`, watched for contact.
   MotionReport Fast(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted = {},
@@ -76,6 +83,9 @@ class Mover {
   /// Slowly along an axis until its coordinate is `coordinate` or a contact comes.
   MotionReport Probe(Direction direction, double coordinate, const std::string& kind, const PredictedCells& predicted,
                      const MayMeet& may_meet = {});
+  /// The same in one motion, however short it ends.
+  MotionReport ProbeOnce(Direction direction, double coordinate, const std::string& kind,
+                         const PredictedCells& predicted, const MayMeet& may_meet = {});
   /// Off a wall: contacts are expected to end, not watched for. Then takes the wrench as zero.
   void Retreat(const Eigen::Vector3d& target);
   /// Compliantly from here straight to `target`, at the speed of an insertion or `speed_m_s`, until the tool rests or,
@@ -108,6 +118,8 @@ class Mover {
  private:
   MotionReport FastOnce(const Eigen::Vector3d& target, const std::string& kind, const PredictedCells& predicted,
                         FreeBy free_by);
+  /// Where steps get lost: makes `motion` again as long as it ends short, no contact is felt, and it gets farther.
+  MotionReport Onward(const std::function<MotionReport()>& motion) const;
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
   /// The speed of a probe along `direction` (unit vector, world axes) that keeps the budget at whatever it may meet.
   double SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face, const MayMeet& may_meet) const;
@@ -136,6 +148,7 @@ class Mover {
   double last_motion_end_s_;
   Eigen::Vector3d position_;
   bool doubts_ = false;
+  bool steps_get_lost_ = false;
 };
 
 /// The axis direction nearest to `motion` if it is along an axis but for 10 % of its length.

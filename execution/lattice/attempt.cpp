@@ -255,7 +255,7 @@ Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, cons
   attempt.frame = FrameOf(episode.task, problem, world_T_estimate);
   attempt.possible = PossibleRegion(problem);
   Mover mover(episode.robot, attempt.frame, episode.options, episode.record, episode.started_s);
-  if (policy.doubt() != nullptr) mover.DoubtContacts();
+  if (const policies::Doubt* doubt = policy.doubt()) mover.DoubtReadings(doubt->steps_get_lost());
   const Direction insertion = episode.task.insertion;
   if (outmost) mover.KeepClearOf(insertion, attempt.frame.center[AxisOf(insertion)] + *outmost);
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();

@@ -203,6 +203,10 @@ void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
     went_in_ = move.direction == task_.insertion;
     evidence_.push_back(touch);
     pending_.reset();
+    if (TakeShort(move, touch)) {
+      mover_.Retreat(Station());
+      return;
+    }
     if (TakeOver(move, touch, tolerance)) {
       if (touch.contact) RetreatFromContact(move.direction);
       return;
@@ -248,9 +252,10 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   }
   const double gone = sign * (mover_.position()[axis] - from);
   const PredictedCells left = std::array<double, 2>{(*predicted)[0] - gone, (*predicted)[1] - gone};
-  return MakeTouch(
-      move.direction, from,
-      mover_.Probe(move.direction, end, "probe", left, WhatMayBeMet(move.direction, move.cells + overtravel)));
+  const MayMeet may_meet = WhatMayBeMet(move.direction, move.cells + overtravel);
+  MotionReport report = mover_.ProbeOnce(move.direction, end, "probe", left, may_meet);
+  if (doubt_ != nullptr && doubt_->steps_get_lost()) report.contact = report.felt;
+  return MakeTouch(move.direction, from, report);
 }
 
 double Localizer::FastMargin(Direction direction) const {
@@ -324,6 +329,23 @@ bool Localizer::Accept(const GuardedMove& move, const Touch& touch, const Outcom
   LogDecision(move, outcome, outcomes);
   robot_ += outcome.cells * UnitCell(move.direction);
   return true;
+}
+
+bool Localizer::TakeShort(const GuardedMove& move, const Touch& touch) {
+  if (doubt_ == nullptr || !doubt_->steps_get_lost() || touch.contact) return false;
+  constexpr double kHalfCell = 0.5;
+  const int axis = AxisOf(touch.direction);
+  const double from_station = SignOf(touch.direction) * (touch.end()[axis] - Station()[axis]);
+  Outcome read = OutcomeAsRead(move, from_station, false);
+  // Where it stands at a wall, that one's cell: walls are anywhere between two lattice points before they are felt.
+  double nearest = kHalfCell;
+  for (const TrackedHypothesis& t : tracked_) {
+    const double off = std::abs(touch.travelled - PredictTravel(*problem_.map, t, touch.start, touch.direction));
+    if (off >= nearest) continue;
+    nearest = off;
+    read.cells = problem_.map->Predict(robot_ - t.hypothesis.offset, move, t.hypothesis.orientation).cells;
+  }
+  return read.cells < move.cells && Accept(move, touch, read, mover_.options().matching, std::nullopt);
 }
 
 bool Localizer::TakeForFalse(const GuardedMove& move, const Touch& touch) {

@@ -23,6 +23,7 @@ namespace feeler::execution {
 /// With a policy that doubts its readings (Policy::doubt) hypotheses are weighed, not dropped: a contact that none
 /// explains is taken for a false one, and when the policy inserts the likeliest are left, those that together have the
 /// probability that it asks for. A false contact that comes again at the same place is no longer believed to be one.
+/// Where steps may get lost a probe that ends short is no contact: the policy is told how far it came.
 class Localizer {
  public:
   /// All arguments outlive the localizer. The tool stands at the start cell of the problem.
@@ -74,6 +75,9 @@ class Localizer {
   /// does. False, and nothing has happened, if the policy has no plan for it or no hypothesis allows it.
   bool Accept(const GuardedMove& move, const Touch& touch, const Outcome& outcome, const MatchOptions& matching,
               std::optional<std::size_t> best);
+  /// Where steps get lost: takes a probe that ended short without a contact at its word. False: it is none, or no
+  /// hypothesis allows it.
+  bool TakeShort(const GuardedMove& move, const Touch& touch);
   /// With doubt: takes a contact that nothing explains for a false one. False: it came again at the same place, or no
   /// hypothesis allows that.
   bool TakeForFalse(const GuardedMove& move, const Touch& touch);

@@ -189,8 +189,9 @@ env::ResetOptions ToResetOptions(const nb::dict& options) {
   nb::dict noise;
   if (!nb::try_cast(options["noise"], noise)) throw InputError("noise", "has the wrong type", "give a name or a dict");
   RequireKnown(noise, {"joint_friction_nm", "force_noise_n", "torque_noise_nm", "force_bias_n", "force_delay_s",
-                       "force_quantum_n", "force_offset_n", "payload_error_kg", "false_stops_per_m",
-                       "encoder_noise_rad", "encoder_jitter_rad", "joint_stiffness_nm_rad", "contact_threshold_n"});
+                       "force_quantum_n", "force_offset_n", "payload_error_kg", "false_stops_per_m", "missed_contact",
+                       "spent_step", "step_m", "encoder_noise_rad", "encoder_jitter_rad", "joint_stiffness_nm_rad",
+                       "contact_threshold_n"});
   env::NoiseOptions& n = reset.noise;
   n.name = "custom";
   if (const auto v = Take<env::JointVector>(noise, "joint_friction_nm")) n.joint_friction_nm = *v;
@@ -203,6 +204,9 @@ env::ResetOptions ToResetOptions(const nb::dict& options) {
                                                               {"force_quantum_n", &n.force_quantum_n},
                                                               {"payload_error_kg", &n.payload_error_kg},
                                                               {"false_stops_per_m", &n.false_stops_per_m},
+                                                              {"missed_contact", &n.missed_contact},
+                                                              {"spent_step", &n.spent_step},
+                                                              {"step_m", &n.step_m},
                                                               {"encoder_noise_rad", &n.encoder_noise_rad},
                                                               {"encoder_jitter_rad", &n.encoder_jitter_rad},
                                                               {"joint_stiffness_nm_rad", &n.joint_stiffness_nm_rad},

@@ -91,6 +91,10 @@ WorldDraw DrawWorld(const Task& task, const EpisodeFaults& faults, double fricti
     draw.physics.contact_friction = value_of(*faults.contact_friction, "contact-friction", 1.0) / friction;
   }
   if (faults.false_stop > 0.0) draw.robot.false_stops_per_m = -std::log1p(-faults.false_stop) / task.cell_m;
+  draw.robot.missed_contact = faults.missed_contact;
+  // Of the cells that end with no false contact: of all cells it is `spent_step` again.
+  draw.robot.spent_step = faults.spent_step / (1.0 - faults.false_stop);
+  if (faults.missed_contact > 0.0 || faults.spent_step > 0.0) draw.robot.step_m = task.cell_m;
   if (faults.port_stiffness_n_m) {
     draw.physics.port_stiffness_n_m = value_of(*faults.port_stiffness_n_m, "port-stiffness", 1e3);
   }

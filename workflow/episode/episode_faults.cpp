@@ -109,6 +109,10 @@ constexpr MeasuredNoise kMeasuredNoises[] = {
      0.0, 5.0, [](EpisodeFaults& n, double mm) { AddSlip(n, mm, mm); }},
     {"false-stop", "probability, a cell, that a motion watched for contact ends with a contact that is none", 0.0, 0.5,
      [](EpisodeFaults& n, double probability) { n.false_stop = probability; }},
+    {"missed-contact", "probability, a cell of a motion that a wall stops, that it is not reported; the cell is spent",
+     0.0, 0.5, [](EpisodeFaults& n, double probability) { n.missed_contact = probability; }},
+    {"spent-step", "probability, a cell of a motion watched for contact, that it is spent while the tool stays", 0.0,
+     0.5, [](EpisodeFaults& n, double probability) { n.spent_step = probability; }},
     {"port-stiffness", "the target stands on springs of so many N/mm, gives way by up to 1 mm and may stay displaced",
      0.1, 1e4, [](EpisodeFaults& n, double n_mm) { AddPortStiffness(n, n_mm, n_mm); }},
     {"worn", "the lead-in of the target is larger by so many mm (negative: smaller)", -5.0, 5.0,
@@ -255,6 +259,9 @@ EpisodeFaults ParseFaults(std::string_view text) {
   }
   if (noise.outside && noise.fall_in) {
     throw InputError("noise", "'outside' and 'fall-in' both say where the target stands", "give one of them");
+  }
+  if (!(noise.false_stop + noise.spent_step < 1.0)) {
+    throw InputError("noise", "with that 'false-stop' and 'spent-step' the tool never moves", "give less of one");
   }
   noise.name = text;
   return noise;

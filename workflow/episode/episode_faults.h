@@ -36,7 +36,9 @@ struct EpisodeFaults {
   /// The tool has slipped in the gripper, in any direction across the insertion, and turned by 2 degrees about it for
   /// every mm, either way.
   std::optional<FaultRange> slip_m;
-  double false_stop = 0.0;  ///< probability, a cell, that a watched motion ends with a contact that is none
+  double false_stop = 0.0;      ///< probability, a cell, that a watched motion ends with a contact that is none
+  double missed_contact = 0.0;  ///< probability, a cell that is blocked, that such a motion reports no contact there
+  double spent_step = 0.0;      ///< probability, a cell that is free, that such a motion spends it while the tool stays
   std::optional<FaultRange> port_stiffness_n_m;  ///< of the springs that the target stands on
   std::optional<FaultRange> worn_m;              ///< the lead-in is larger by this; negative: smaller
 };
