@@ -50,14 +50,22 @@ MotionResult SimulatedRobot::WatchedLine(const Pose& goal, double speed_m_s, dou
   const Eigen::Vector3d way_m = goal.translation() - start.translation();
   const double length_m = way_m.norm();
   const WatchedWay way = DrawWatchedWay(noise, length_m, memory_.false_stop_random, memory_.spent_step_random);
-  Pose stop = goal;
-  if (way.advance_m < length_m) {
-    const double share = way.advance_m / length_m;
-    stop.translation() = start.translation() + share * way_m;
-    stop.linear() =
+  const auto after = [&](double travelled_m) {
+    Pose pose = goal;
+    if (travelled_m >= length_m) return pose;
+    const double share = travelled_m / length_m;
+    pose.translation() = start.translation() + share * way_m;
+    pose.linear() =
         Eigen::Quaterniond(start.linear()).slerp(share, Eigen::Quaterniond(goal.linear())).toRotationMatrix();
+    return pose;
+  };
+  MotionResult result = FollowLine(Line(after(way.advance_m), speed_m_s, acceleration_m_s2), watch);
+  if (result.reason == StopReason::kReached && way.look_m > 0.0) {
+    // Were the last steps, which are spent, free? Where they were the tool is back as if it had stayed.
+    result = FollowLine(Line(after(way.advance_m + way.look_m), speed_m_s, acceleration_m_s2), watch);
+    if (result.reason == StopReason::kReached)
+      result = FollowLine(Line(after(way.advance_m), speed_m_s, acceleration_m_s2), {});
   }
-  MotionResult result = FollowLine(Line(stop, speed_m_s, acceleration_m_s2), watch);
   if (result.reason == StopReason::kContact) {
     const double advanced_m = (result.world_T_tool.translation() - start.translation()).norm();
     MissContact(way.StepsLeft(advanced_m), noise.step_m / speed_m_s, result);

@@ -7,7 +7,8 @@ namespace feeler::env {
 
 int WatchedWay::StepsLeft(double advanced_m) const {
   if (!(step_m > 0.0)) return 1;
-  const auto spent = std::ranges::count_if(spent_at_m, [&](double at_m) { return at_m < advanced_m; });
+  // Those at the wall itself were blocked: they read it.
+  const auto spent = std::ranges::count_if(spent_at_m, [&](double at_m) { return at_m + step_m <= advanced_m; });
   const double left_m = length_m - advanced_m - static_cast<double>(spent) * step_m;
   return std::max(1, static_cast<int>(std::lround(left_m / step_m)));
 }
@@ -27,16 +28,20 @@ WatchedWay DrawWatchedWay(const NoiseOptions& noise, double length_m, RandomStre
   way.advance_m = made_m;
   if (!(noise.spent_step > 0.0)) return way;
   way.advance_m = 0.0;
-  for (double left_m = made_m; left_m > kNothing_m;) {
-    const double step_m = std::min(noise.step_m, left_m);
-    left_m -= step_m;
+  // What is no whole step comes first, so that the last one, of which more may hang, is one.
+  double step_m = std::fmod(made_m, noise.step_m);
+  if (step_m < kNothing_m) step_m = noise.step_m;
+  for (double left_m = made_m; left_m > kNothing_m; left_m -= step_m, step_m = noise.step_m) {
     if (spent_steps.Uniform() < 1.0 - std::pow(1.0 - noise.spent_step, step_m / noise.step_m)) {
       way.spent_at_m.push_back(way.advance_m);
       way.spent_m += step_m;
+      way.look_m = std::min(noise.step_m, way.look_m + step_m);
     } else {
       way.advance_m += step_m;
+      way.look_m = 0.0;
     }
   }
+  if (way.false_contact) way.look_m = 0.0;
   return way;
 }
 

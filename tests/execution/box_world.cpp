@@ -146,6 +146,7 @@ bool KinematicRobot::InOpening(const Eigen::Vector3d& at) const {
 Pose KinematicRobot::ToolPose() const { return world_T_tool_; }
 
 MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched) {
+  if (watched && faults_.step_m > 0.0) return BySteps(to_world_m, speed_m_s);
   if (!watched || !(faults_.false_stops_per_m > 0.0)) return Travel(to_world_m, speed_m_s, watched);
   const Eigen::Vector3d from = world_T_tool_.translation();
   const double length = (to_world_m - from).norm();
@@ -154,6 +155,34 @@ MotionResult KinematicRobot::Go(const Eigen::Vector3d& to_world_m, double speed_
   MotionResult result = Travel(from + until / length * (to_world_m - from), speed_m_s, watched);
   result.contact = true;
   result.reason = StopReason::kContact;
+  return result;
+}
+
+MotionResult KinematicRobot::BySteps(const Eigen::Vector3d& to_world_m, double speed_m_s) {
+  const Eigen::Vector3d from = world_T_tool_.translation();
+  const double length = (to_world_m - from).norm();
+  std::vector<bool> spent;
+  double free = 0.0;
+  for (double left = length; left > 1e-9; left -= faults_.step_m) {
+    spent.push_back(random_.Uniform() < faults_.spent_step * std::min(1.0, left / faults_.step_m));
+    if (!spent.back()) free += std::min(left, faults_.step_m);
+  }
+  const Eigen::Vector3d stop = length > 0.0 ? Eigen::Vector3d(from + free / length * (to_world_m - from)) : from;
+  MotionResult result = Travel(stop, speed_m_s, true);
+  if (!result.contact) return result;
+  double made = 0.0;  // steps up to the one that meets the wall, from how far the tool came
+  double advanced = 0.0;
+  for (std::size_t i = 0; i < spent.size() && advanced < result.travelled_m - 1e-9; ++i) {
+    made += faults_.step_m;
+    if (!spent[i]) advanced += faults_.step_m;
+  }
+  const double beyond = advanced - result.travelled_m;  // of the step that meets it
+  int reads = std::max(1, static_cast<int>(std::lround((length - made + beyond) / faults_.step_m)));
+  while (reads > 0 && random_.Uniform() < faults_.missed_contact) --reads;
+  if (reads > 0) return result;
+  pressing_.setZero();
+  result.contact = false;
+  result.reason = StopReason::kReached;
   return result;
 }
 

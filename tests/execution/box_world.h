@@ -47,6 +47,11 @@ struct RobotFaults {
   double opening_yaw_rad = 0.0;
   /// Watched motions end with a contact that is none, so many a metre, at places of an exponential law.
   double false_stops_per_m = 0.0;
+  /// Watched motions are made of steps of so many m (0: they are not), each of which fails: one that is blocked reports
+  /// no contact, one that is free is spent.
+  double step_m = 0.0;
+  double missed_contact = 0.0;
+  double spent_step = 0.0;
   int phantom_contacts = 0;  ///< so many guarded motions stop half way with a contact that is none
 };
 
@@ -71,6 +76,7 @@ class KinematicRobot : public Robot {
 
  private:
   MotionResult Go(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
+  MotionResult BySteps(const Eigen::Vector3d& to_world_m, double speed_m_s);
   MotionResult Travel(const Eigen::Vector3d& to_world_m, double speed_m_s, bool watched);
   Eigen::Vector3d Displacement(const Eigen::Vector3d& world_m) const;
   bool InOpening(const Eigen::Vector3d& displacement_m) const;

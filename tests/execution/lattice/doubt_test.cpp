@@ -3,6 +3,7 @@
 //   allows changes nothing; a contact that contradicts a hypothesis lowers it and does not drop it;
 // - with false contacts the policy that was planned for them inserts where the one that takes every reading at its word
 //   loses the tree, and what it believes is true;
+// - where steps are spent or contacts missed it goes on, and inserts; what it believes is true;
 // - what is there is believed: without false contacts nothing is lost.
 #include <gtest/gtest.h>
 
@@ -79,7 +80,7 @@ std::string Text(const Counts& counts) {
   return text;
 }
 
-Counts RunAll(const planner::Problem& problem, policies::Policy& policy, double false_stops_per_m, int episodes) {
+Counts RunAll(const planner::Problem& problem, policies::Policy& policy, const RobotFaults& faults, int episodes) {
   const Task task = HousingTask();
   Counts counts;
   for (int i = 0; i < episodes; ++i) {
@@ -87,8 +88,6 @@ Counts RunAll(const planner::Problem& problem, policies::Policy& policy, double 
     RandomStream draw(4, number, "true pose");
     Pose truth = Pose::Identity();
     for (int axis = 0; axis < 3; ++axis) truth.translation()[axis] = draw.Uniform(-1.5, 1.5) * task.cell_m;
-    RobotFaults faults;
-    faults.false_stops_per_m = false_stops_per_m;
     KinematicRobot robot(HousingOverPanel(), task, truth, LatticeStartPose(task, problem, Pose::Identity()), faults,
                          RandomStream(4, number, "robot"));
     const ExecutionRecord record = Execute(task, problem, Pose::Identity(), policy, robot);
@@ -99,25 +98,64 @@ Counts RunAll(const planner::Problem& problem, policies::Policy& policy, double 
   return counts;
 }
 
+/// The policy that is planned for the noise, and one that knows of none.
+struct Planned {
+  explicit Planned(const planner::Noise& noise)
+      : problem(planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3})) {
+    planner::SolverOptions options;
+    options.expansion_limit = 2000;  // a first policy needs several hundred
+    planner::NoisyResult doubting = planner::SolveNoisy({problem, noise, {}}, options);
+    noisy = std::make_unique<policies::NoisyGraphPolicy>(
+        std::make_shared<const planner::NoisyPolicy>(std::move(doubting.policy)),
+        policies::Doubt{noise, planner::Declaration{}.confidence});
+    plain = std::make_unique<policies::DatabasePolicy>(
+        std::make_shared<const planner::PolicyGraph>(*planner::Solve(problem, options).policy));
+  }
+  planner::Problem problem;
+  std::unique_ptr<policies::NoisyGraphPolicy> noisy;
+  std::unique_ptr<policies::DatabasePolicy> plain;
+};
+
 TEST(Doubt, InsertsWhereReadingsAtTheirWordLoseTheTree) {
-  const planner::Problem problem = planner::MakeCuboidProblem(HousingTask(), HousingMap(), {3, 3, 3});
   const planner::Noise noise{0.0, 0.02, 0.0};
-  planner::SolverOptions options;
-  options.expansion_limit = 2000;  // a first policy needs several hundred
-  planner::NoisyResult doubting = planner::SolveNoisy({problem, noise, {}}, options);
-  policies::NoisyGraphPolicy noisy(std::make_shared<const planner::NoisyPolicy>(std::move(doubting.policy)),
-                                   policies::Doubt{noise, planner::Declaration{}.confidence});
-  policies::DatabasePolicy plain(
-      std::make_shared<const planner::PolicyGraph>(*planner::Solve(problem, options).policy));
+  Planned planned(noise);
   constexpr int kEpisodes = 40;
-  const double per_m = -std::log1p(-noise.false_stop) / HousingTask().cell_m;
-  const Counts with = RunAll(problem, noisy, per_m, kEpisodes);
-  const Counts without = RunAll(problem, plain, per_m, kEpisodes);
+  RobotFaults faults;
+  faults.false_stops_per_m = -std::log1p(-noise.false_stop) / HousingTask().cell_m;
+  const Counts with = RunAll(planned.problem, *planned.noisy, faults, kEpisodes);
+  const Counts without = RunAll(planned.problem, *planned.plain, faults, kEpisodes);
   // 99 and 51 of 100 at this writing.
   EXPECT_GE(with.inserted, 36) << Text(with);
   EXPECT_LE(without.inserted, with.inserted - 10) << Text(without);
   EXPECT_EQ(with.wrong, 0);
-  EXPECT_EQ(RunAll(problem, noisy, 0.0, 10).inserted, 10);
+  EXPECT_EQ(RunAll(planned.problem, *planned.noisy, {}, 10).inserted, 10);
+}
+
+TEST(Doubt, GoesOnWhereAStepWasSpent) {
+  const planner::Noise noise{0.0, 0.0, 0.05};
+  Planned planned(noise);
+  constexpr int kEpisodes = 40;
+  RobotFaults faults;
+  faults.step_m = HousingTask().cell_m;
+  faults.spent_step = noise.slip;
+  const Counts with = RunAll(planned.problem, *planned.noisy, faults, kEpisodes);
+  const Counts without = RunAll(planned.problem, *planned.plain, faults, kEpisodes);
+  EXPECT_GE(with.inserted, 36) << Text(with);
+  EXPECT_LE(without.inserted, with.inserted - 10) << Text(without);
+  EXPECT_EQ(with.wrong, 0);
+  EXPECT_EQ(RunAll(planned.problem, *planned.noisy, {}, 10).inserted, 10);
+}
+
+TEST(Doubt, FeelsForAContactThatWasMissed) {
+  const planner::Noise noise{0.1, 0.0, 0.0};
+  Planned planned(noise);
+  RobotFaults faults;
+  faults.step_m = HousingTask().cell_m;
+  faults.missed_contact = noise.missed_contact;
+  const Counts with = RunAll(planned.problem, *planned.noisy, faults, 40);
+  EXPECT_GE(with.inserted, 36) << Text(with);
+  EXPECT_EQ(with.wrong, 0);
+  EXPECT_EQ(RunAll(planned.problem, *planned.noisy, {}, 10).inserted, 10);
 }
 
 }  // namespace
