@@ -23,7 +23,7 @@ namespace {
 using planner::TransferPlan;
 using planner::TransferStatus;
 
-const Scene& PlugScene() {
+const Scene& SceneOfPlug() {
   static const Scene scene = BuildScene(LoadTask("plug"));
   return scene;
 }
@@ -67,7 +67,7 @@ void ExpectFree(const Scene& scene, const TransferPlan& plan, const TransferChec
 }
 
 TEST(Transfer, FromHomeToTheStartPose) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   TransferChecker checker(scene);
   const auto begin = std::chrono::steady_clock::now();
   const TransferPlan plan = PlanTransfer(checker, scene, scene.home_q_rad, NominalStartPose(scene));
@@ -83,7 +83,7 @@ TEST(Transfer, FromHomeToTheStartPose) {
 
 // Between random free poses over the table, among which the panel and the arm itself stand in the way.
 TEST(Transfer, AnywhereOverTheTable) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   TransferChecker checker(scene);
   RandomStream random(1, 0, "transfer test");
   JointVector start = scene.home_q_rad;
@@ -123,7 +123,7 @@ TEST(Transfer, AnywhereOverTheTable) {
 // The panel of the target stood upright between start and goal: the straight motion is barred and RRT-Connect must find
 // the way around it.
 TEST(Transfer, GoesAroundAWall) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   TransferChecker checker(scene);
   const Pose wall = MakePose(Eigen::Vector3d(0.7, 0.0, 0.2),
                              Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX())));
@@ -169,7 +169,7 @@ TEST(Transfer, GoesAroundAWall) {
 }
 
 TEST(Transfer, RespectsEveryPlaceTheTargetMayBe) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   TransferChecker checker(scene);
   const Pose low = NominalStartPose(scene, Eigen::Vector3d(0.0, 0.0, -0.016));  // 8 mm above the nominal rim
   const std::vector<JointVector> branches = ToolInverseKinematics(scene, low);
@@ -189,7 +189,7 @@ TEST(Transfer, RespectsEveryPlaceTheTargetMayBe) {
 }
 
 TEST(Transfer, ReportsWhatCannotBe) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   TransferChecker checker(scene);
   const Pose far = MakePose(Eigen::Vector3d(3, 0, 0.3), Eigen::Quaterniond::Identity());
   EXPECT_EQ(PlanTransfer(checker, scene, scene.home_q_rad, far).status, TransferStatus::kNoGoal);
@@ -212,7 +212,7 @@ Pose BelowTheTable() { return MakePose(Eigen::Vector3d(0.65, 0.0, -0.4), Eigen::
 TEST(Transfer, ASearchThatWouldGoOnIsGivenUpOrStopped) {
   RobotOptions options;
   options.transfer.most_checks = 3000;
-  SimulatedRobot robot(std::make_shared<const Scene>(PlugScene()), options);
+  SimulatedRobot robot(std::make_shared<const Scene>(SceneOfPlug()), options);
   const MotionResult given_up = robot.Transfer(BelowTheTable());
   EXPECT_EQ(given_up.reason, StopReason::kUnplanned);
   EXPECT_NE(given_up.detail.find("given up"), std::string::npos) << given_up.detail;
@@ -224,12 +224,12 @@ TEST(Transfer, ASearchThatWouldGoOnIsGivenUpOrStopped) {
   EXPECT_EQ(asked, 6) << "asked while it plans, and no more then";
   EXPECT_EQ(robot.Time(), 0.0) << "nothing moved";
   robot.SetInterruption({});
-  EXPECT_EQ(robot.Transfer(NominalStartPose(PlugScene())).reason, StopReason::kReached);
+  EXPECT_EQ(robot.Transfer(NominalStartPose(SceneOfPlug())).reason, StopReason::kReached);
 }
 
 // No point of the robot moves farther than the sweep says: the law the spacing of checks rests on.
 TEST(Transfer, SweepBoundsTheWayOfEveryPoint) {
-  const Scene& scene = PlugScene();
+  const Scene& scene = SceneOfPlug();
   const TransferChecker checker(scene);
   const mjModel& model = *scene.model;
   const DataHandle data = MakeData(model);
