@@ -79,6 +79,8 @@ def run(
     noise: str = "ideal",
     placement: str = "nominal",
     table: str | os.PathLike[str] | None = None,
+    force_budget: float | None = None,
+    wrist_stiffness: float = 0.0,
     ladder: bool | None = None,
     withhold_true_pose: bool = False,
     replay: bool = False,
@@ -97,6 +99,8 @@ def run(
         first: number of the first episode.
         noise: names of :func:`fault_names`, with commas between.
         table: an uncertainty table: hypotheses come from a simulated depth camera.
+        force_budget: no contact is to push harder, N; default: the task's, or more where the noise of the sensor asks for it.
+        wrist_stiffness: of springs between gripper and tool, N/m (2000 or more); 0: held rigidly.
         ladder: fallbacks; default: as the policy has them.
         replay: keep what the episodes looked like in their records (for the report).
         robot: called with the simulated robot at the start of each episode; what it returns (a :class:`feeler.Robot`)
@@ -126,6 +130,8 @@ def run(
         noise,
         placement,
         "" if table is None else as_path(table, "table"),
+        force_budget,
+        wrist_stiffness,
         ladder,
         withhold_true_pose,
         replay,

@@ -1,6 +1,9 @@
 // Seeded episodes in simulation: feeler.run.
 #include "episodes.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <mutex>
 
 #include "common.h"
@@ -53,9 +56,9 @@ std::shared_ptr<const workflow::EpisodePerception> PerceptionFor(const std::stri
 nb::tuple Run(PlanningTask& task, const nb::object& policy, const std::shared_ptr<policies::Database>& database,
               const std::vector<std::string>& policy_options, std::int64_t episodes, std::int64_t first,
               std::uint64_t seed, const nb::object& extents, const std::string& noise, const std::string& placement,
-              const std::string& table, std::optional<bool> ladder, bool withhold_true_pose, bool replay,
-              const nb::object& robot, int jobs, CancellationToken* outer, const nb::object& on_record,
-              const nb::object& progress) {
+              const std::string& table, std::optional<double> force_budget_n, double wrist_stiffness_n_m,
+              std::optional<bool> ladder, bool withhold_true_pose, bool replay, const nb::object& robot, int jobs,
+              CancellationToken* outer, const nb::object& on_record, const nb::object& progress) {
   if (episodes < 1) throw InputError("episodes", "are " + std::to_string(episodes), "give 1 or more");
   if (first < 0) throw InputError("first", "is " + std::to_string(first), "give 0 or more");
   CancellationToken own;
@@ -73,6 +76,12 @@ nb::tuple Run(PlanningTask& task, const nb::object& policy, const std::shared_pt
   options.family = workflow::FamilyToDrawFrom(ExtentsText(extents), database.get(), setup->task());
   options.noise = noise;
   if (!table.empty()) options.perception = PerceptionFor(table, *setup);
+  if (force_budget_n && !(*force_budget_n > 0.0 && std::isfinite(*force_budget_n))) {
+    throw InputError("force_budget", fmt::format("is {:g}", *force_budget_n), "give newtons, above 0, or None");
+  }
+  options.force_budget_n = force_budget_n;
+  env::SceneOptions scene_options;
+  scene_options.wrist_stiffness_n_m = wrist_stiffness_n_m;
   options.ladder = ladder.value_or(!named || workflow::UsesLadder(name));
   options.replay = replay;
   options.withhold_true_pose = withhold_true_pose;
@@ -120,7 +129,7 @@ nb::tuple Run(PlanningTask& task, const nb::object& policy, const std::shared_pt
   };
   try {
     RunInterruptibly(token, [&] {
-      const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup);
+      const std::shared_ptr<const env::Scene> scene = workflow::BuildEpisodeScene(*setup, scene_options);
       const auto make_runner = [&] { return workflow::EpisodeRunner(setup, scene, factory, options); };
       return workflow::RunEpisodes(workflow::EpisodeRange(first, first + episodes), Threads(jobs), make_runner, take,
                                    report, &token);
@@ -149,8 +158,9 @@ void BindEpisodes(nb::module_& m) {
     return names;
   });
   m.def("run", &Run, "task"_a, "policy"_a, "database"_a.none(), "policy_options"_a, "episodes"_a, "first"_a, "seed"_a,
-        "extents"_a.none(), "noise"_a, "placement"_a, "table"_a, "ladder"_a.none(), "withhold_true_pose"_a, "replay"_a,
-        "robot"_a.none(), "jobs"_a, "cancellation"_a.none(), "on_record"_a.none(), "progress"_a.none());
+        "extents"_a.none(), "noise"_a, "placement"_a, "table"_a, "force_budget"_a.none(), "wrist_stiffness"_a,
+        "ladder"_a.none(), "withhold_true_pose"_a, "replay"_a, "robot"_a.none(), "jobs"_a, "cancellation"_a.none(),
+        "on_record"_a.none(), "progress"_a.none());
   m.def(
       "summarize",
       [](const std::string& path) {

@@ -64,6 +64,21 @@ def test_summary_and_records(database):
     assert [content(r) for r in later.records] == [content(r) for r in run.records[2:]]
 
 
+def test_a_budget_and_a_wrist_make_contacts_gentler(database):
+    """Half of the budget halves the peak, and takes longer; a tool on springs is gentler and no slower."""
+    plain = feeler.run("plug", database=database, episodes=3, seed=3)
+    gentle = feeler.run("plug", database=database, episodes=3, seed=3, force_budget=12)
+    soft = feeler.run("plug", database=database, episodes=3, seed=3, force_budget=12, wrist_stiffness=15000)
+    assert plain.inserted == gentle.inserted == soft.inserted == 3
+    assert all(r.force_budget_n == 12 and r.peak_force_n <= 12 for r in (*gentle.records, *soft.records))
+    assert max(r.peak_force_n for r in plain.records) > 12
+    assert gentle.sim_time_median_s > plain.sim_time_median_s
+    assert soft.sim_time_median_s < gentle.sim_time_median_s
+    for wrong, words in (({"force_budget": 0}, "force_budget"), ({"wrist_stiffness": 10}, "stiffness of the wrist")):
+        with pytest.raises(feeler.InputError, match=words):
+            feeler.run("plug", database=database, **wrong)
+
+
 def test_a_robot_in_python_gives_the_episodes_of_cpp(database):
     ours = feeler.run("plug", database=database, episodes=4, seed=5)
     theirs = feeler.run("plug", database=database, episodes=4, seed=5, robot=feeler.ForwardingRobot)
