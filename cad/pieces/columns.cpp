@@ -117,7 +117,7 @@ class Envelope {
     if (outlines_.empty()) {
       outlines_ = std::move(outlines);
       holes_ = std::move(holes);
-      return !outlines_.empty();
+      return true;  // at a tip there is nothing yet
     }
     return Widen(outlines) && Narrow(outlines, holes);
   }
@@ -209,7 +209,7 @@ class Stacker {
         Cell cell;
         for (const SlabPoint& p : polygon) cell.push_back(p.middle);
         Stack(cell, first, last - 1, kHalvings);
-        if (pieces_.size() > most_) return std::nullopt;
+        if (pieces_.size() > most_ || (is_rough_ && !options_.rough)) return std::nullopt;
       }
       first = last;
     }
@@ -219,7 +219,7 @@ class Stacker {
  private:
   /// Hulls of as many slabs as may be, from the lowest up.
   void Stack(const Cell& cell, std::size_t first, std::size_t last, int halvings) {
-    while (first <= last && pieces_.size() <= most_) {
+    while (first <= last && pieces_.size() <= most_ && (!is_rough_ || options_.rough)) {
       std::size_t reached = first;
       std::optional<ConvexPiece> hull = HullOver(cell, first, last);
       if (!hull || StaysInside(*hull, solid_, options_)) {
@@ -254,6 +254,7 @@ class Stacker {
   /// A slab over a cell for which one hull does not do: over its halves.
   void Split(const Cell& cell, std::size_t slab, int halvings) {
     if (halvings == 0) {
+      is_rough_ = true;
       if (auto hull = HullOver(cell, slab, slab)) pieces_.push_back(std::move(*hull));
       return;
     }
@@ -308,6 +309,7 @@ class Stacker {
   const DecomposeOptions& options_;
   std::size_t most_;
   std::vector<ConvexPiece> pieces_;
+  bool is_rough_ = false;  ///< some piece leaves the tolerances
 };
 
 }  // namespace

@@ -14,7 +14,8 @@ namespace feeler::cad {
 /// each other (a rounded rim, a dome, a bore that a slanting face cuts) share one partition, of the narrowest holes in
 /// the widest outline; over each of its polygons as many slabs as the tolerances allow become one hull. A hull holds
 /// all of the solid in its cell, so that nothing is lost; what it adds is judged by StaysInside. Nothing where that
-/// takes more than `most` bodies. `with_ends`: the ends of the slabs are cross-sections, too, not their middles alone.
+/// takes more than `most` bodies, or one that is not allowed to be rough. `with_ends`: the ends of the slabs are
+/// cross-sections, too, not their middles alone.
 std::optional<std::vector<ConvexPiece>> ColumnsOf(const std::vector<Slab>& slabs, bool with_ends, const MeshTree& solid,
                                                   const DecomposeOptions& options, std::size_t most);
 

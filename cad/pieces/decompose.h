@@ -14,6 +14,7 @@ struct DecomposeOptions {
   double tolerance_near_m = 1e-6;  ///< of the surface in the box
   double tolerance_far_m = 1e-6;   ///< elsewhere
   int most_slabs = 160;            ///< beyond it, slabs of a free form are drawn together
+  bool rough = true;  ///< a column that no hull fits however it is halved is taken as it comes; else none is
 };
 
 /// A solid as convex bodies whose union is the solid. One that is convex is one body; else the part is sliced along z

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -81,6 +82,62 @@ bool IsReflex(const Region& region, const Corner& corner, double tolerance_m) {
     return std::abs(Cross(chord, next.*at - loop[corner.place.index].*at)) / length > tolerance_m;
   };
   return stands_in(&SlabPoint::middle) || stands_in(&SlabPoint::low) || stands_in(&SlabPoint::high);
+}
+
+/// Which points are corners of the convex hull of a loop (Andrew 1979).
+std::vector<bool> OnHull(const SlabLoop& loop, Height at) {
+  std::vector<std::size_t> order(loop.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto point = [&](std::size_t i) -> const Eigen::Vector2d& { return loop[i].*at; };
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    const Eigen::Vector2d& p = point(a);
+    const Eigen::Vector2d& q = point(b);
+    return p.x() != q.x() ? p.x() < q.x() : p.y() != q.y() ? p.y() < q.y() : a < b;
+  });
+  std::vector<bool> on_hull(loop.size(), false);
+  for (int side = 0; side < 2; ++side) {
+    std::vector<std::size_t> chain;
+    for (const std::size_t i : order) {
+      while (chain.size() >= 2) {
+        const Eigen::Vector2d& last = point(chain.back());
+        if (Cross(last - point(chain[chain.size() - 2]), point(i) - last) > 0) break;
+        chain.pop_back();
+      }
+      chain.push_back(i);
+    }
+    for (const std::size_t i : chain) on_hull[i] = true;
+    std::reverse(order.begin(), order.end());
+  }
+  return on_hull;
+}
+
+/// The corner that is deepest below its side of the loop's convex hull, where that is more than the tolerance. Along an
+/// arc each corner may stand in by next to nothing, and all of them by much.
+std::optional<std::size_t> Deepest(const SlabLoop& loop, double tolerance_m) {
+  const std::size_t count = loop.size();
+  double deepest_m = tolerance_m;
+  std::optional<std::size_t> found;
+  for (const Height at : {&SlabPoint::middle, &SlabPoint::low, &SlabPoint::high}) {
+    const std::vector<bool> on_hull = OnHull(loop, at);
+    const auto first = std::find(on_hull.begin(), on_hull.end(), true);
+    if (first == on_hull.end()) continue;
+    const auto start = static_cast<std::size_t>(first - on_hull.begin());
+    for (std::size_t from = 0; from < count;) {
+      std::size_t to = from + 1;
+      while (to < count && !on_hull[(start + to) % count]) ++to;
+      const Eigen::Vector2d& a = loop[(start + from) % count].*at;
+      const Eigen::Vector2d side = loop[(start + to) % count].*at - a;
+      for (std::size_t i = from + 1; i < to && side.norm() > kTouch_m; ++i) {
+        const std::size_t corner = (start + i) % count;
+        const double depth_m = Cross(side, loop[corner].*at - a) / side.norm();
+        if (depth_m <= deepest_m) continue;
+        deepest_m = depth_m;
+        found = corner;
+      }
+      from = to;
+    }
+  }
+  return found;
 }
 
 bool IsPrism(const Region& region) {
@@ -187,6 +244,10 @@ class Cutter {
         // Every hole has to be opened, however small its corners are.
         if (IsReflex(region, corner, l == 0 ? tolerance_m_ : 0.0)) reflex.push_back(corner);
       }
+    }
+    if (reflex.empty() && region.loops.size() == 1) {
+      if (const auto corner = Deepest(region.loops.front(), tolerance_m_))
+        reflex.push_back(CornerAt(region, 0, *corner));
     }
     std::stable_sort(reflex.begin(), reflex.end(),
                      [](const Corner& a, const Corner& b) { return a.angle > b.angle + 1e-6; });

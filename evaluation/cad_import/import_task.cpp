@@ -106,13 +106,25 @@ std::string Place(const Eigen::Vector3d& p) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f}) mm from the mouth", 1000 * p.x(), 1000 * p.y(), 1000 * p.z());
 }
 
-/// Sides of the opening, where each may need a piece of its own.
-std::size_t BoreFacets(const cad::Mating& mating) {
-  std::size_t facets = 0;
-  for (const cad::SlabLoop& loop : mating.openings) {
-    facets += cad::Simplified(loop, [](const cad::SlabPoint&) { return 1e-6; }).size();
+std::size_t SidesOf(const std::vector<cad::SlabLoop>& loops) {
+  std::size_t sides = 0;
+  for (const cad::SlabLoop& loop : loops) {
+    sides += cad::Simplified(loop, [](const cad::SlabPoint&) { return 1e-6; }).size();
   }
-  return facets;
+  return sides;
+}
+
+/// Sides of the opening, where each may need a piece of its own. A slanting rim has no line: then those of the holes
+/// below it, of the part in its place.
+std::size_t BoreFacets(const cad::Mating& mating, const std::string& role, const cad::TriangleMesh& placed) {
+  if (!mating.openings.empty()) return SidesOf(mating.openings);
+  std::size_t most = 0;
+  for (const double share : {0.25, 0.5, 0.75, 0.95}) {
+    std::vector<cad::SlabLoop> holes = cad::SectionAt(placed, (role == "tool" ? 1 : -1) * share * mating.depth_m);
+    std::erase_if(holes, [](const cad::SlabLoop& loop) { return cad::SignedArea(loop) > 0; });
+    most = std::max(most, SidesOf(holes));
+  }
+  return most;
 }
 
 /// Domes and fillets have more corners than contact needs: those go that leave the surface where it is within what is
@@ -138,7 +150,7 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
   part.placed = cad::Transformed(part.checked.mesh, frame_T_cad);
   const double clearance = mating.clearance_m.minCoeff();
   const double budget = options.deviation_share * clearance;
-  const std::size_t facets = BoreFacets(mating);
+  const std::size_t facets = BoreFacets(mating, role, part.placed);
   // A tapered bore has the sides of both its ends.
   const std::size_t most = facets > 24 ? std::min(kMostPiecesOfBore, 2 * facets + kMostPieces) : kMostPieces;
   struct Tolerances {
@@ -149,27 +161,34 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
   for (const auto& [share, far_m] : {std::pair{0.2, 1e-5}, {0.5, 5e-5}, {0.7, 1e-4}, {0.9, 2e-4}, {0.9, 4e-4}}) {
     ladder.push_back({std::max(1e-6, share * budget), std::max(1e-6, far_m)});
   }
-  bool found = false;
-  for (const Tolerances& step : ladder) {
+  const auto cut = [&](const Tolerances& step, bool rough) {
+    const bool last = &step == &ladder.back();
     cad::DecomposeOptions decompose;
     decompose.mating = mating.mating_box;
     decompose.tolerance_near_m = step.near_m;
     decompose.tolerance_far_m = step.far_m;
+    decompose.rough = rough;
     // Slices of so many bodies seldom unite to few enough, and it takes long to see that.
-    const std::size_t most_bodies = kMostBodies * (&step == &ladder.back() ? kMostPiecesOfBore : most);
-    const std::size_t most_pieces = &step == &ladder.back() ? most_bodies : most;
+    const std::size_t most_bodies = kMostBodies * (last ? kMostPiecesOfBore : most);
+    const std::size_t most_pieces = last ? most_bodies : most;
     part.pieces.clear();
-    bool all = true;
-    for (const cad::TriangleMesh& solid : part.checked.solids) {
-      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies, most_pieces);
-      all = pieces.has_value();
-      if (!all) break;
-      for (cad::ConvexPiece& piece : *pieces) part.pieces.push_back(std::move(piece));
-    }
     part.tolerance_near_m = step.near_m;
     part.tolerance_far_m = step.far_m;
-    found = all;
-    if (all && part.pieces.size() <= most) break;
+    for (const cad::TriangleMesh& solid : part.checked.solids) {
+      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies, most_pieces);
+      if (!pieces) return false;
+      for (cad::ConvexPiece& piece : *pieces) part.pieces.push_back(std::move(piece));
+    }
+    return true;
+  };
+  // What leaves the tolerances only where nothing stays within them: it may do.
+  bool found = false;
+  for (const bool rough : {false, true}) {
+    for (const Tolerances& step : ladder) {
+      found = cut(step, rough);
+      if (found && part.pieces.size() <= most) break;
+    }
+    if (found && part.pieces.size() <= (rough ? kMostPiecesOfBore : most)) break;
   }
   FewerCorners(mating, budget, part);
   if (!found) {

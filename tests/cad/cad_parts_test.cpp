@@ -119,6 +119,27 @@ TEST(ConvexPartition, CoversARingOfManySides) {
   EXPECT_LE(static_cast<int>(polygons.size()), sides + 1);
 }
 
+// Of so many corners none stands in by as much as the tolerance: together they must not, either.
+TEST(ConvexPartition, OfAFineRingNoPolygonReachesIntoTheHole) {
+  SlabLoop hole;
+  const int sides = 3000;
+  const double radius_m = 0.006;
+  for (int k = 0; k < sides; ++k) {
+    const double angle = -2 * std::numbers::pi * k / sides;
+    hole.push_back(Upright(radius_m * std::cos(angle), radius_m * std::sin(angle)));
+  }
+  const double tolerance_m = 2.5e-6;
+  const std::vector<SlabLoop> polygons = ConvexPartition({Square(0.01), hole}, tolerance_m, false).value();
+  double deepest_m = 0.0;
+  for (const SlabLoop& polygon : polygons) {
+    for (const SlabPoint& a : polygon) {
+      for (const SlabPoint& b : polygon) deepest_m = std::max(deepest_m, radius_m - 0.5 * (a.middle + b.middle).norm());
+    }
+  }
+  EXPECT_LE(deepest_m, tolerance_m + radius_m * (1 - std::cos(std::numbers::pi / sides)) + 1e-9);
+  EXPECT_LE(polygons.size(), 150U);  // chords of that sagitta: 108
+}
+
 TEST(ConvexPartition, AHoleStaysOpenWhereASliverIsCutFromItsRim) {
   // A shaft with six teeth; beside each the rim comes back by 0.07 mm.
   const std::vector<Eigen::Vector2d> tooth{
@@ -303,6 +324,17 @@ TEST_F(CadParts, AHoleThatLeansAgainstItsBlockIsFoundAndCut) {
   const Mating mating =
       MeasureMating(tool, target.mesh, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
   EXPECT_NEAR(1000 * mating.clearance_m.minCoeff(), 0.1, 0.01);
+  DecomposeOptions options;
+  options.mating = mating.mating_box;
+  options.tolerance_near_m = 5e-6;
+  options.tolerance_far_m = 5e-5;
+  options.rough = false;
+  const TriangleMesh solid = Transformed(target.solids.front(), mating.frame_T_target);
+  const auto pieces = DecomposeIfFew(solid, options, 4096, 512);
+  ASSERT_TRUE(pieces.has_value());
+  const MeshTree tree(solid);
+  EXPECT_LE(SampledDeviation(tree, *pieces, 40000, 5).lost_m, options.tolerance_near_m + 1e-6);  // at its tips, too
+  EXPECT_LE(SampledDeviation(tree, *pieces, 40000, 5, mating.mating_box).added_m, options.tolerance_near_m + 1e-6);
 }
 
 TEST_F(CadParts, AnAssembledToolIsTakenToItsStopAndMayNotLean) {
