@@ -76,6 +76,42 @@ Polygon3 Shrunk(const ConvexPiece& piece, int triangle, double depth_m) {
   return shrunk.empty() ? polygon : shrunk;
 }
 
+/// What of a convex polygon may be farther from the part than `enough_m`: all but what lies over a triangle of the part
+/// that is no farther from its corners. The distance to a triangle is a convex function.
+std::vector<Polygon3> FarFrom(const MeshTree& part, const Polygon3& polygon, double enough_m) {
+  constexpr double kOver_m = 1e-9;
+  constexpr std::size_t kMostParts = 200;  // then patches do as well
+  Box box;
+  for (const Eigen::Vector3d& p : polygon) box.extend(p);
+  std::vector<Polygon3> rest{polygon};
+  part.Visit(Box(box.min().array() - enough_m, box.max().array() + enough_m), [&](int t) {
+    const TriangleMesh& mesh = part.mesh();
+    const Eigen::Vector3d area = AreaVector(mesh, t);
+    if (area.norm() < 1e-16) return true;
+    const std::array<Eigen::Vector3d, 3> corners{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
+    ConvexPiece over;  // the prism over the triangle, of its sides alone
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d normal = (corners[(k + 1) % 3] - corners[k]).cross(area).normalized();
+      over.planes.push_back({normal, normal.dot(corners[k])});
+    }
+    const auto is_near = [&](const Eigen::Vector3d& p) {
+      return (p - ClosestOnTriangle(p, corners[0], corners[1], corners[2])).norm() <= enough_m;
+    };
+    std::vector<Polygon3> next;
+    for (Polygon3& one : rest) {
+      const Polygon3 within = ClipToPiece(one, over, kOver_m);
+      if (within.empty() || !std::all_of(within.begin(), within.end(), is_near)) {
+        next.push_back(std::move(one));
+        continue;
+      }
+      for (Polygon3& outside : Outside(one, over, kOver_m)) next.push_back(std::move(outside));
+    }
+    rest = std::move(next);
+    return !rest.empty() && rest.size() < kMostParts;
+  });
+  return rest;
+}
+
 /// The farthest that the faces of the pieces stand out of the part.
 Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const std::optional<Box>& zone,
            double accuracy_m) {
@@ -92,11 +128,26 @@ Best Added(const MeshTree& part, const std::vector<ConvexPiece>& pieces, const s
     patch.bound = here + radius;
     if (patch.bound > best.value + accuracy_m) queue.push(patch);
   };
+  // First the middles of the faces: what they say lets most of the rest go.
+  std::vector<Patch> faces;
   for (const ConvexPiece& piece : pieces) {
     for (int t = 0; t < piece.surface.size(); ++t) {
       Polygon3 polygon = Shrunk(piece, t, accuracy_m);
       if (zone) polygon = ClipToBox(std::move(polygon), *zone);
-      for (std::size_t k = 1; k + 1 < polygon.size(); ++k) judge({{polygon[0], polygon[k], polygon[k + 1]}, 0});
+      for (std::size_t k = 1; k + 1 < polygon.size(); ++k) {
+        const Patch patch{{polygon[0], polygon[k], polygon[k + 1]}, 0};
+        const Eigen::Vector3d center = (patch.corners[0] + patch.corners[1] + patch.corners[2]) / 3;
+        const bool inside = part.Inside(center);
+        if (inside && !SurfaceCuts(part, patch.corners)) continue;
+        if (!inside) best.Offer(part.Distance(center), center);
+        faces.push_back(patch);
+      }
+    }
+  }
+  for (const Patch& face : faces) {
+    const Polygon3 polygon(face.corners.begin(), face.corners.end());
+    for (const Polygon3& rest : FarFrom(part, polygon, best.value + accuracy_m)) {
+      for (std::size_t k = 1; k + 1 < rest.size(); ++k) judge({{rest[0], rest[k], rest[k + 1]}, 0});
     }
   }
   for (int cut = 0; cut < kMostPatches && !queue.empty(); ++cut) {
