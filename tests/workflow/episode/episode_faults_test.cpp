@@ -37,6 +37,8 @@ TEST(ParseFaults, CombinesNamesAndRefusesContradictions) {
       name.replace(number, std::string::npos,
                    name.starts_with("stiffness")    ? "20000"
                    : name.starts_with("false-stop") ? "0.3"
+                   : name.starts_with("missed-con") ? "0.3"
+                   : name.starts_with("spent-step") ? "0.3"
                                                     : "3");
     }
     if (const std::size_t range = name.find("FROM..TO"); range != std::string::npos) {
@@ -133,6 +135,21 @@ TEST(DrawWorld, FalseStopsAreCountedPerMetre) {
   EXPECT_NEAR(std::exp(-draw.robot.false_stops_per_m * task.cell_m), 0.98, 1e-12);
   EXPECT_EQ(DrawWorld(task, ParseFaults("ideal"), 0.3, 5, 1).robot.false_stops_per_m, 0.0);
   EXPECT_THROW((void)ParseFaults("false-stop=0.6"), InputError);
+}
+
+TEST(DrawWorld, StepsFailWithTheProbabilitiesOfTheModel) {
+  const Task task = ThreeAxisTask();
+  const env::NoiseOptions robot =
+      DrawWorld(task, ParseFaults("false-stop=0.2,missed-contact=0.1,spent-step=0.3"), 0.3, 5, 1).robot;
+  EXPECT_EQ(robot.step_m, task.cell_m);
+  EXPECT_EQ(robot.missed_contact, 0.1);
+  const double no_false_stop = std::exp(-robot.false_stops_per_m * task.cell_m);
+  EXPECT_NEAR(no_false_stop, 0.8, 1e-12);
+  EXPECT_NEAR(no_false_stop * robot.spent_step, 0.3, 1e-12) << "of all cells, those that end falsely included";
+  EXPECT_EQ(DrawWorld(task, ParseFaults("ideal"), 0.3, 5, 1).robot.step_m, 0.0);
+  for (const char* bad : {"missed-contact=0.6", "spent-step=-0.1", "false-stop=0.5,spent-step=0.5"}) {
+    EXPECT_THROW((void)ParseFaults(bad), InputError) << bad;
+  }
 }
 
 TEST(DrawWorld, RangesOfPhysicsAreDrawnPerEpisode) {
