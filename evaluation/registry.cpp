@@ -15,11 +15,14 @@
 #include "feeler/evaluation/paper/visual_servoing.h"
 #include "feeler/evaluation/studies/baselines.h"
 #include "feeler/evaluation/studies/bounds.h"
+#include "feeler/evaluation/studies/graded_bounds.h"
 #include "feeler/evaluation/studies/noise.h"
 #include "feeler/evaluation/studies/noise_price.h"
+#include "feeler/evaluation/studies/noise_price_episodes.h"
 #include "feeler/evaluation/studies/perception.h"
 #include "feeler/evaluation/studies/pomdp_benchmarks.h"
 #include "feeler/evaluation/studies/pomdp_experience.h"
+#include "feeler/evaluation/studies/priors.h"
 #include "feeler/evaluation/studies/spiral_tuning.h"
 
 namespace feeler::evaluation {
@@ -41,15 +44,21 @@ std::vector<Experiment> AllExperiments() {
       {kBoundsName, "lower and upper bound of the certified solver over time, closed and open socket", RunBounds, true},
       {kFigureTblName, "planning time and relative cost of touch-based localization against the number of hypotheses",
        RunFigureTbl, true},
+      {kGradedBoundsName, "Tables I and III over bounds of graded strength: where the printed picture appears",
+       RunGradedBounds},
       {kNoiseName, "sensor noise, joint friction and stiffness, a turned target: what breaks first", RunNoise},
       {kNoisePriceName, "what noise in the readings costs: policies that know of it, and those that do not",
        RunNoisePrice},
+      {kNoisePriceEpisodesName, "the same in physics: insertions, wrong ones, seconds, with the noise known and not",
+       RunNoisePriceEpisodes},
       {kPerceptionName, "registration and uncertainty table over the workspace: errors, coverage, hypotheses",
        RunPerception},
       {kPomdpBenchmarksName, "general POMDPs: proven intervals over time beside SARSOP's, and RTDP-Bel",
        RunPomdpBenchmarks, false, false, true},
       {kPomdpExperienceName, "families of general POMDPs: RTDP-Bel against E-RTDP-Bel with a similar problem's policy",
        RunPomdpExperience},
+      {kPriorsName, "the camera's own errors as a prior: from the calibration to episodes, against equal weights",
+       RunPriors},
       {kSpiralTuningName, "pitch, speed and force of the spiral search, per socket", RunSpiralTuning},
       {kTable1PlugName, "Table I: RTDP-Bel against E-RTDP-Bel on the plug, and the fast setting", RunTable1Plug, true,
        true},
@@ -81,8 +90,9 @@ const std::vector<Experiment>& Experiments() {
     std::vector<Experiment> all = AllExperiments();
     for (Experiment& experiment : all) {
       // Those whose cells and records are measured one by one; the others are minutes in all.
-      for (const auto* name : {kAcceptanceClosedLoopName, kBaselinesName, kFigureTblName, kNoiseName, kSpiralTuningName,
-                               kTable1PlugName, kTable2FrameworkName, kTable3AblationName, kTable4PipeName}) {
+      for (const auto* name :
+           {kAcceptanceClosedLoopName, kBaselinesName, kFigureTblName, kNoiseName, kNoisePriceEpisodesName,
+            kSpiralTuningName, kTable1PlugName, kTable2FrameworkName, kTable3AblationName, kTable4PipeName}) {
         if (experiment.name == name) experiment.takes_shard = true;
       }
     }

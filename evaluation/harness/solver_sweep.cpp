@@ -86,6 +86,7 @@ nlohmann::json ToJson(const SolverRow& row) {
   if (options.expansion_limit != std::numeric_limits<std::int64_t>::max()) {
     document["expansion_limit"] = options.expansion_limit;
   }
+  if (row.heuristic_share != 1.0) document["heuristic_share"] = row.heuristic_share;
   if (options.solver == planner::SolverKind::kCertified) {
     document["gap"] = options.gap;
   } else {
@@ -149,12 +150,16 @@ std::string SolverSweep::CellOf(const SolverRow& row, std::uint64_t seed, const 
   return row.label + " seed " + std::to_string(seed) + " " + planner::ToString(extents);
 }
 
-std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const planner::SolverOptions& options) {
-  auto& tables = tables_[options.heuristic];
-  if (!tables) {
-    const planner::Problem problem =
-        planner::MakeCuboidProblem(case_.task, case_.map, planner::LargestExtents(sample_));
-    tables = planner::BuildPlanningTables(problem, options, context_.jobs, context_.store.get());
+std::shared_ptr<const planner::PlanningTables> SolverSweep::TablesFor(const SolverRow& row) {
+  auto& tables = tables_[{row.options.heuristic, row.heuristic_share}];
+  if (tables) return tables;
+  const planner::Problem problem = planner::MakeCuboidProblem(case_.task, case_.map, planner::LargestExtents(sample_));
+  if (row.heuristic_share == 1.0) {
+    tables = planner::BuildPlanningTables(problem, row.options, context_.jobs, context_.store.get());
+  } else {
+    const auto weakened = std::make_shared<planner::PlanningTables>(problem, row.options, context_.jobs);
+    weakened->WeakenHeuristics(row.heuristic_share);
+    tables = weakened;
   }
   return tables;
 }
@@ -179,7 +184,7 @@ bool SolverSweep::Run() {
         options.experience = row.experience;
         options.jobs = context_.jobs;
         if (context_.shard) options.only = std::make_shared<const std::vector<planner::Extents>>(own);
-        options.tables = TablesFor(row.options);
+        options.tables = TablesFor(row);
         options.cancellation = context_.cancellation;
         options.progress = [&](std::int64_t done, std::int64_t) {
           if (context_.progress) context_.progress(before + done, total);
@@ -204,7 +209,7 @@ std::vector<SolveRecord> SolverSweep::Records(std::size_t row) const {
 }
 
 std::vector<double> SolverSweep::StartHeuristics(std::size_t row) {
-  const auto tables = TablesFor(rows_[row].options);
+  const auto tables = TablesFor(rows_[row]);
   std::vector<double> values;
   for (const planner::Extents& extents : sample_.problems) {
     const planner::Problem problem = planner::MakeCuboidProblem(case_.task, case_.map, extents);

@@ -36,6 +36,7 @@ struct SolverRow {
   planner::SolverOptions options;
   planner::ProblemOrder order = planner::ProblemOrder::kUncertainty;
   planner::ExperienceKind experience = planner::ExperienceKind::kRollout;
+  double heuristic_share = 1.0;  ///< PlanningTables::WeakenHeuristics
 };
 nlohmann::json ToJson(const SolverRow& row);
 
@@ -74,14 +75,14 @@ class SolverSweep {
  private:
   class Sink;
   std::string CellOf(const SolverRow& row, std::uint64_t seed, const planner::Extents& extents) const;
-  std::shared_ptr<const planner::PlanningTables> TablesFor(const planner::SolverOptions& options);
+  std::shared_ptr<const planner::PlanningTables> TablesFor(const SolverRow& row);
 
   PlanningCase case_;
   planner::ProblemFamily sample_;
   std::vector<SolverRow> rows_;
   std::vector<std::uint64_t> seeds_;
   SweepContext context_;
-  std::map<planner::HeuristicKind, std::shared_ptr<const planner::PlanningTables>> tables_;
+  std::map<std::pair<planner::HeuristicKind, double>, std::shared_ptr<const planner::PlanningTables>> tables_;
 };
 
 }  // namespace feeler::evaluation

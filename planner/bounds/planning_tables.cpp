@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "feeler/planner/belief/hull.h"
@@ -29,6 +30,19 @@ std::vector<int> OrientationsOf(const Problem& problem) {
   orientations.erase(std::unique(orientations.begin(), orientations.end()), orientations.end());
   return orientations;
 }
+
+/// A share of another heuristic: as admissible and consistent, and weaker.
+class WeakenedHeuristic : public BeliefHeuristic {
+ public:
+  WeakenedHeuristic(std::unique_ptr<BeliefHeuristic> full, double share) : full_(std::move(full)), share_(share) {}
+  double Weighted(SetId set, const Cell& robot) override { return share_ * full_->Weighted(set, robot); }
+  double Estimate(SetId set, const Cell& robot) override { return share_ * full_->Estimate(set, robot); }
+  std::size_t bytes() const override { return full_->bytes(); }
+
+ private:
+  std::unique_ptr<BeliefHeuristic> full_;
+  double share_;
+};
 
 /// Changes when tables of the same problem come out otherwise.
 constexpr int kTablesVersion = 1;
@@ -118,6 +132,13 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
                                                                const HypothesisSets& sets) const {
+  std::unique_ptr<BeliefHeuristic> heuristic = MakeFullHeuristic(problem, sets);
+  if (heuristic_share_ == 1.0) return heuristic;
+  return std::make_unique<WeakenedHeuristic>(std::move(heuristic), heuristic_share_);
+}
+
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeFullHeuristic(const Problem& problem,
+                                                                   const HypothesisSets& sets) const {
   if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_, oriented_lines_);
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   if (lines_ && oriented_pairs_) return std::make_unique<LineHeuristic>(problem, sets, lines_, oriented_pairs_);

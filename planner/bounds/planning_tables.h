@@ -30,6 +30,9 @@ class PlanningTables {
   const ContactMasks& masks() const { return masks_; }
   /// Memory of all tables, those for the filled map included, as they stand: pairs are tabled when first asked for.
   std::size_t bytes() const;
+  /// From now on heuristics are this share, in (0, 1], of what they would be: what their strength is worth. Before the
+  /// tables are shared.
+  void WeakenHeuristics(double share) { heuristic_share_ = share; }
   /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
   std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets) const;
 
@@ -43,9 +46,12 @@ class PlanningTables {
   const Filled& filled() const;
 
  private:
+  std::unique_ptr<BeliefHeuristic> MakeFullHeuristic(const Problem& problem, const HypothesisSets& sets) const;
+
   std::shared_ptr<const ContactMap> map_;
   Problem problem_;  ///< whose costs, goal and move lengths the tables are for
   SolverOptions options_;
+  double heuristic_share_ = 1.0;
   std::optional<ArrayStore> store_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
