@@ -71,7 +71,7 @@ std::vector<Variant> Variants() {
 
 /// Row of variant v under bound b is b * variants + v; the reference, whose costs stand for V*, is the last.
 std::vector<SolverRow> GradedRowsOf(const std::vector<Bound>& bounds, const std::vector<Variant>& variants,
-                              std::int64_t expansion_limit) {
+                                    std::int64_t expansion_limit) {
   std::vector<SolverRow> rows;
   for (const Bound& bound : bounds) {
     for (const Variant& variant : variants) {
@@ -133,7 +133,7 @@ Graded Grade(SolverSweep& sweep, const Bound& bound, std::size_t first, const st
     const std::vector<SolveRecord> records = sweep.Records(first + v);
     const auto solved = std::ranges::count_if(records, &SolveRecord::complete);
     VariantResult m{WilsonRate(static_cast<int>(solved), static_cast<int>(records.size())),
-               SpeedupOf(sweep.Records(first + variant.base), records)};
+                    SpeedupOf(sweep.Records(first + variant.base), records)};
     const auto judge = [&](bool met, const char* what) {
       ++graded.values;
       if (!met) graded.missed.push_back(fmt::format("{} of {}", what, variant.name));
@@ -242,7 +242,8 @@ void AddStatement(const std::vector<Graded>& all, ExperimentResult& result) {
       "\nspeed: expansions of rtdp-bel 1 (naive, random: of e-rtdp-bel 2) over those of the row; >= and <=: limits "
       "cut\n"
       "  attempts of one side short, ~ of both\n"
-      "met: a printed success in the interval of the measured one, a printed speed within a factor of 2 of it, ~ never\n"
+      "met: a printed success in the interval of the measured one, a printed speed within a factor of 2 of it, ~ "
+      "never\n"
       "{}: {} of {} printed values are met at best, by {} (V*/heur {:.2f})\n",
       best->missed.empty() ? "The printed picture appears" : "No strength shows the printed picture", met, best->values,
       best->bound.name, best->ratio);
