@@ -286,13 +286,13 @@ std::vector<Eigen::Vector3d> Mover::WayOver(const Eigen::Vector3d& target) const
   if (!outmost_) return {};
   const int axis = AxisOf(outmost_->first);
   const double out = -SignOf(outmost_->first);
-  const double rise = out * (outmost_->second - position_[axis]);
+  const double rise = std::max(0.0, out * (outmost_->second - position_[axis]));
   const double fall = std::max(0.0, out * (outmost_->second - target[axis]));
-  if (rise <= 0.0 || (target - position_).norm() < kLonger * (rise + fall)) return {};
-  std::vector<Eigen::Vector3d> way{position_};
-  way.back()[axis] = outmost_->second;
-  if (fall > 0.0) {
-    way.push_back(target);
+  if ((target - position_).norm() < kLonger * (rise + fall)) return {};
+  std::vector<Eigen::Vector3d> way;
+  for (const auto& [slow, end] : {std::pair(rise, position_), std::pair(fall, target)}) {
+    if (slow <= 0.0) continue;
+    way.push_back(end);
     way.back()[axis] = outmost_->second;
   }
   return way;

@@ -158,6 +158,7 @@ TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
 
 TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
   Bench bench(0.1);
+  bench.robot.meets = false;
   bench.record.careful = true;
   const double fast_m_s = bench.options.transfer_speed_m_s;
   const auto speed_to = [&](Mover& mover, const Eigen::Vector3d& to) {
@@ -171,7 +172,7 @@ TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 5.5}), fast_m_s);
   EXPECT_LT(speed_to(mover, {20.0, 0.0, 4.5}), fast_m_s) << "down into it";
   EXPECT_LT(speed_to(mover, {20.5, 0.0, 4.5}), fast_m_s) << "below";
-  EXPECT_LT(speed_to(mover, {20.5, 0.6, 5.0}), fast_m_s) << "out of it";
+  EXPECT_LT(speed_to(mover, {20.5, 0.1, 5.0}), fast_m_s) << "out of it";
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 8.0}), fast_m_s);
   // Out is against the insertion, along any axis.
   mover.KeepClearOf(Direction::kPlusX, 30.0);
@@ -234,6 +235,19 @@ TEST(Mover, LongWaysAfterASurprisePassOverTheTarget) {
   EXPECT_LT(out[0], fast_m_s);
   EXPECT_EQ(out[1], fast_m_s);
   EXPECT_EQ(ways(2, {4.0, 0.0, 0.0}).size(), 1u) << "short";
+  {
+    Bench bench(1.0);
+    bench.robot.meets = false;
+    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    mover.Retreat({0.0, 0.0, 6.0});
+    mover.KeepClearOf(Direction::kMinusZ, 3.0);
+    bench.record.startled = 2;
+    const std::size_t before = bench.robot.speeds_m_s.size();
+    mover.Fast({20.0, 5.0, 1.0}, "transfer");
+    ASSERT_EQ(bench.robot.speeds_m_s.size(), before + 2) << "from outside: over, and in";
+    EXPECT_EQ(bench.robot.speeds_m_s[before], fast_m_s);
+    EXPECT_LT(bench.robot.speeds_m_s[before + 1], fast_m_s);
+  }
   EXPECT_EQ(ways(2, {20.0, 0.0, -15.0}).size(), 1u) << "deep";
   EXPECT_EQ(ways(0, {20.0, 5.0, 1.0}).size(), 1u) << "no surprise";
 }
