@@ -100,10 +100,13 @@ double Strangeness(const Found& found) {
          std::min(found.trial.roll_rad, 2 * kPi - found.trial.roll_rad);
 }
 
-/// Whether two ways in lead to one place: what is in holes lies there, or the tool stands there.
+/// Whether two ways in lead to one place: what is in holes lies there, or the tool stands there. Two holes lie a size
+/// apart at least; the ends of a tool, with a key and without, have their middles in one hole at different places.
 bool OneMouth(const Found& a, const Found& b) {
+  constexpr double kPartOfSize = 0.25;
   if (a.trial.target != b.trial.target) return false;
-  const double near_m = 5e-4 + 2 * std::min(a.slack_m, b.slack_m);
+  const double near_m =
+      std::max(5e-4 + 2 * std::min(a.slack_m, b.slack_m), kPartOfSize * std::min(a.trial.size_m, b.trial.size_m));
   if ((a.middle - b.middle).norm() <= near_m) return true;
   return a.trial.tool == b.trial.tool && a.trial.roll_rad == b.trial.roll_rad &&
          (a.offset - b.offset).head<2>().norm() <= near_m;
@@ -138,6 +141,20 @@ std::string InMillimetres(const Eigen::Vector3d& p) {
                   1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(), 1000 * miss.hole.y(),
                   1000 * miss.too_wide_m),
       "check the sizes and the --unit");
+}
+
+/// Of ways that differ by a small turn alone, that with the most play: the others are it, turned as far as play allows.
+void KeepUnturned(std::vector<Found>& found) {
+  constexpr double kSmall_rad = 5.0 * kPi / 180.0;
+  constexpr double kMore_m = 1e-6;
+  const std::vector<Found> all = found;
+  std::erase_if(found, [&](const Found& f) {
+    return std::any_of(all.begin(), all.end(), [&](const Found& other) {
+      const double turn_rad = std::remainder(f.trial.roll_rad - other.trial.roll_rad, 2.0 * kPi);
+      return other.trial.tool == f.trial.tool && std::abs(turn_rad) < kSmall_rad && OneMouth(f, other) &&
+             other.slack_m > f.slack_m + kMore_m && other.engaged_m >= 0.9 * f.engaged_m;
+    });
+  });
 }
 
 /// Of what fits, the tightest; of equals the deepest.
@@ -200,6 +217,7 @@ Alignment FindAlignment(const TriangleMesh& tool, const TriangleMesh& target, co
     if (auto result = Verify(tools[trial.tool], turned, trial)) found.push_back(*result);
   }
   if (found.empty()) NoFit(miss, true);
+  KeepUnturned(found);
   if (options.mouth) {
     const std::vector<Found> all = found;
     std::erase_if(found,

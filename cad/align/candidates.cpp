@@ -216,11 +216,24 @@ int Tapers(const SlabLoop& low, const SlabLoop& high) {
   return high_m2 > low_m2 ? 1 : -1;
 }
 
-/// A line that goes on into the next slab, as of a prism or a taper.
+double Around(const SlabLoop& loop) {
+  double length = 0.0;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    length += (loop[i].middle - loop[(i + 1) % loop.size()].middle).norm();
+  }
+  return length;
+}
+
+/// A line that goes on into the next slab, as of a prism or a taper. Where the slabs meet it is the same; what steps
+/// there, as at the end of a key, is another, however little that is of the whole.
 bool GoesOn(const Feature& below, const Feature& above) {
+  constexpr double kSame_m = 4e-6;  // lines are simplified by 1e-6
   if (below.hole != above.hole || std::abs(below.high_m - above.low_m) > 1e-9) return false;
   if (std::abs(below.area - above.area) > 0.03 * std::max(below.area, above.area)) return false;
   if (Tapers(below.loop, below.loop) != Tapers(above.loop, above.loop)) return false;
+  const SlabLoop end = UpperEnd(below.loop);
+  const SlabLoop begin = LowerEnd(above.loop);
+  if (std::abs(std::abs(SignedArea(end)) - std::abs(SignedArea(begin))) > kSame_m * Around(end)) return false;
   const Eigen::AlignedBox2d a = BoundsOf(below.loop);
   const Eigen::AlignedBox2d b = BoundsOf(above.loop);
   return (a.center() - b.center()).norm() < 0.02 * a.sizes().maxCoeff();

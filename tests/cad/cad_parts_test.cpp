@@ -302,6 +302,34 @@ TEST_F(CadParts, ATurnAboutTheWayInIsFound) {
   }
 }
 
+// Whether a key ends where its plug goes on, whether both ends of a plug go into one hole, and whether a turn by a
+// little is play or not depends on no turn and no size.
+TEST_F(CadParts, AKeyIsFoundHoweverItIsTurnedAndHoweverLargeItIs) {
+  struct Drawn {
+    double roll_deg, scale, looser;
+  };
+  for (const Drawn& drawn : {Drawn{127.4, 0.94, 1.12}, {89.4, 1.2, 1.3}, {-68.6, 1.57, 1.07}, {0.0, 1.98, 1.47}}) {
+    PartPlacement placement = RolledBy(drawn.roll_deg);
+    placement.scale = drawn.scale;
+    placement.looser = drawn.looser;
+    for (const char* kind : {"keyed", "rectangle"}) {
+      const double looser = kind == std::string("keyed") ? drawn.looser : 1.0;
+      const PartFiles files = WriteParts(kind, folder_, "step", placement);
+      const TriangleMesh tool = Read(files.tool).mesh;
+      const TriangleMesh target = Read(files.target).mesh;
+      ASSERT_NO_THROW({
+        const Alignment alignment = FindAlignment(tool, target);
+        const Mating mating =
+            MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
+        const double drawn_mm = (kind == std::string("keyed") ? 0.15 : 0.1) * drawn.scale * looser;
+        EXPECT_NEAR(1000 * mating.clearance_m.x(), drawn_mm, 0.002) << kind << ' ' << drawn.roll_deg;
+        EXPECT_NEAR(1000 * mating.clearance_m.y(), drawn_mm, 0.002) << kind << ' ' << drawn.roll_deg;
+      }) << kind
+         << ' ' << drawn.roll_deg;
+    }
+  }
+}
+
 TEST_F(CadParts, PartsThatLieAnyhowGoTogether) {
   for (const std::string kind : {"keyed-shaft", "hexagon", "three-pin", "keyed"}) {
     const PartFiles files = WriteParts(kind, folder_, "stl", Anyhow(1));

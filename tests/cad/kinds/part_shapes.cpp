@@ -23,6 +23,7 @@
 #include <TopoDS.hxx>
 #include <TopoDS_Compound.hxx>
 #include <TopoDS_Edge.hxx>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -71,6 +72,13 @@ Shape Turned(const Shape& shape, const gp_Dir& axis, double degrees) {
   return BRepBuilderAPI_Transform(shape, turn, true).Shape();
 }
 
+Shape Scaled(const Shape& shape, double factor) {
+  if (factor == 1.0) return shape;
+  gp_Trsf scale;
+  scale.SetScale(gp_Pnt(0, 0, 0), factor);
+  return BRepBuilderAPI_Transform(shape, scale, true).Shape();
+}
+
 Shape Placed(const Shape& shape, const Eigen::Isometry3d& pose) {
   if (pose.isApprox(Eigen::Isometry3d::Identity(), 1e-15)) return shape;
   const Eigen::Matrix3d r = pose.linear();
@@ -103,15 +111,15 @@ Points Regular(int sides, double across_flats) {
   return points;
 }
 
-Pair Keyed() {
-  const double c = 0.15;
+Pair Keyed(double looser) {
+  const double c = 0.15 * looser;
   return {
       Block(20, 10, 0, 50) + Box3(-1.5, 1.5, 4, 6.5, 0, 20),
       Block(40, 32, -20, 0) - (Block(20 + 2 * c, 10 + 2 * c, -12, 1) + Box3(-1.5 - c, 1.5 + c, 4, 6.5 + c, -12, 1))};
 }
 
-Pair DPlug() {
-  const double c = 0.12;
+Pair DPlug(double looser) {
+  const double c = 0.12 * looser;
   return {Rod(0, 0, 6, 0, 50) - Box3(4, 10, -10, 10, -1, 60),
           Block(30, 30, -16, 0) - (Rod(0, 0, 6 + c, -10, 1) - Box3(4 + c, 10, -10, 10, -11, 2))};
 }
@@ -125,26 +133,26 @@ Pair UsbA() {
   return {tool, target};
 }
 
-Pair Rj45() {
+Pair Rj45(double looser) {
   // The latch: a tongue along the plug's back, at an angle.
   const Points side{{4.0, 2}, {4.6, 2}, {7.0, 14}, {6.4, 15}, {4.0, 15}};
   Shape latch = Turned(Prism(side, -3.0, 3.0), gp_Dir(1, 0, 0), 90);  // (y of the profile is z)
   latch = Turned(latch, gp_Dir(0, 0, 1), 90);
   const Shape tool = Block(11.6, 8.2, 0, 21) + latch + Box3(-5.8, 5.8, -4.1, 4.1, 20, 55);
-  const double c = 0.13;
+  const double c = 0.13 * looser;
   const Shape target = Block(18, 20, -16, 0) - (Box3(-5.8 - c, 5.8 + c, -4.1 - c, 4.1 + c, -14, 1) +
                                                 Box3(-3.0 - c, 3.0 + c, 4, 7.0 + c, -14, 1));
   return {tool, target};
 }
 
-Pair TwoPin() {
-  const double c = 0.2;
+Pair TwoPin(double looser) {
+  const double c = 0.2 * looser;
   return {Rod(-9.25, 0, 2, 0, 20) + Rod(9.25, 0, 2, 0, 20) + Block(34, 14, 19, 55),
           Block(46, 24, -25, 0) - (Rod(-9.25, 0, 2 + c, -19, 1) + Rod(9.25, 0, 2 + c, -19, 1))};
 }
 
-Pair ThreePin() {
-  const double c = 0.2;
+Pair ThreePin(double looser) {
+  const double c = 0.2 * looser;
   const auto pins = [](double grow, double z0, double z1, double earth) {
     return Box3(-11.1 - 3.2 - grow, -11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
            Box3(11.1 - 3.2 - grow, 11.1 + 3.2 + grow, -2 - grow, 2 + grow, z0, z1) +
@@ -187,15 +195,15 @@ Pair Shell() {
 }
 
 /// A rectangular hole with a lead-in of 1 mm.
-Pair Chamfered() {
-  const double c = 0.2;
+Pair Chamfered(double looser) {
+  const double c = 0.2 * looser;
   return {Block(10, 8, 0, 40),
           Block(40, 40, -20, 0) - (Block(10 + 2 * c, 8 + 2 * c, -12, 0) + Flare(-5 - c, 5 + c, -4 - c, 4 + c, -1, 0))};
 }
 
 /// The same of a hole that is not convex.
-Pair ChamferedTee() {
-  const double c = 0.2;
+Pair ChamferedTee(double looser) {
+  const double c = 0.2 * looser;
   return {
       Box3(-8, 8, 2, 6, 0, 40) + Box3(-2, 2, -8, 3, 0, 40),
       Block(40, 40, -20, 0) - (Box3(-8 - c, 8 + c, 2 - c, 6 + c, -12, 0) + Box3(-2 - c, 2 + c, -8 - c, 3 + c, -12, 0) +
@@ -204,19 +212,19 @@ Pair ChamferedTee() {
 
 Pair Rectangle(double c) { return {Block(8, 7, 0, 50), Block(25, 25, 0, 9) - Block(8 + 2 * c, 7 + 2 * c, -1, 10)}; }
 
-Pair Tilted() {
-  const Pair upright = Rectangle(0.1);
+Pair Tilted(double looser) {
+  const Pair upright = Rectangle(0.1 * looser);
   const gp_Dir axis(1, 2, 0.5);
   return {Turned(upright.tool, gp_Dir(0, 1, 0), 35), Moved(Turned(upright.target, axis, 20), 3, -5, 40)};
 }
 
-Pair Assembled() {
-  const Pair keyed = Keyed();
+Pair Assembled(double looser) {
+  const Pair keyed = Keyed(looser);
   return {Moved(keyed.tool, 30, 20, 5 - 12), Moved(keyed.target, 30, 20, 5)};
 }
 
-Pair TwoMouths() {
-  const double c = 0.1;
+Pair TwoMouths(double looser) {
+  const double c = 0.1 * looser;
   return {Block(8, 7, 0, 50), Block(60, 25, -12, 0) - (Box3(-15 - 4 - c, -15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1) +
                                                        Box3(15 - 4 - c, 15 + 4 + c, -3.5 - c, 3.5 + c, -9, 1))};
 }
@@ -226,8 +234,8 @@ Shape KeyedRod(double grow, double z0, double z1) {
   return Rod(0, 0, 6 + grow, z0, z1) + Box3(4, 7.5 + grow, -1.5 - grow, 1.5 + grow, z0, z1);
 }
 
-Pair KeyedShaft() {
-  const double c = 0.1;
+Pair KeyedShaft(double looser) {
+  const double c = 0.1 * looser;
   return {KeyedRod(0, 0, 45), Block(30, 30, -16, 0) - KeyedRod(c, -12, 1)};
 }
 
@@ -244,14 +252,14 @@ Shape Teeth(int count, double root, double tip, double z0, double z1) {
 }
 
 /// A gear with a keyway over a post with a key.
-Pair KeyedGear() {
-  const double c = 0.1;
+Pair KeyedGear(double looser) {
+  const double c = 0.1 * looser;
   return {Teeth(20, 13, 15.6, 0, 10) - KeyedRod(c, -1, 11), Block(60, 60, -8, 0) + KeyedRod(0, -1, 18)};
 }
 
 /// A pinion that goes into a ring with teeth inside.
-Pair RingGear() {
-  const double c = 0.15;
+Pair RingGear(double looser) {
+  const double c = 0.15 * looser;
   return {Teeth(12, 7, 9, 0, 40), Rod(0, 0, 18, -14, 0) - Teeth(12, 7 + c, 9 + c, -10, 1)};
 }
 
@@ -272,8 +280,8 @@ Points Oval(double a, double b) {
 }
 
 /// No corner and no straight side.
-Pair Ellipse() {
-  const double c = 0.15;
+Pair Ellipse(double looser) {
+  const double c = 0.15 * looser;
   return {Prism(Oval(7, 4.5), 0, 45), Block(30, 26, -15, 0) - Prism(Oval(7 + c, 4.5 + c), -10, 1)};
 }
 
@@ -306,8 +314,8 @@ Shape Rounded(const Shape& shape, double radius, const std::function<bool(const 
 }
 
 /// Edges of the peg and of the block, and the rim of the hole, are rounded.
-Pair Filleted() {
-  const double c = 0.12;
+Pair Filleted(double looser) {
+  const double c = 0.12 * looser;
   const Shape peg = Rounded(Block(10, 8, 0, 45), 0.8, [](const gp_Pnt&) { return true; });
   const Shape block = Rounded(Block(34, 30, -18, 0), 2.0, [](const gp_Pnt& p) { return p.Z() > -17; });
   const Shape hole = Rounded(Block(10 + 2 * c, 8 + 2 * c, -12, 5), 0.8,
@@ -324,40 +332,45 @@ Pair FilletedBore() {
                        [](const gp_Pnt& p) { return std::abs(p.Z()) < 1e-6 && std::hypot(p.X(), p.Y()) < 6; })};
 }
 
-Pair Draw(const std::string& kind) {
-  static const std::vector<std::pair<std::string, std::function<Pair()>>> kKinds = {
+/// A kind whose clearances are what they are.
+std::function<Pair(double)> AsDrawn(Pair (*draw)()) {
+  return [draw](double) { return draw(); };
+}
+
+Pair Draw(const std::string& kind, double looser) {
+  static const std::vector<std::pair<std::string, std::function<Pair(double)>>> kKinds = {
       {"keyed", Keyed},
       {"d-plug", DPlug},
-      {"usb-a", UsbA},
+      {"usb-a", AsDrawn(UsbA)},
       {"rj45", Rj45},
       {"two-pin", TwoPin},
       {"three-pin", ThreePin},
-      {"gear", Gear},
-      {"hex-socket", HexSocket},
-      {"taper", Taper},
-      {"long-taper", LongTaper},
-      {"shell", Shell},
+      {"gear", AsDrawn(Gear)},
+      {"hex-socket", AsDrawn(HexSocket)},
+      {"taper", AsDrawn(Taper)},
+      {"long-taper", AsDrawn(LongTaper)},
+      {"shell", AsDrawn(Shell)},
       {"chamfered", Chamfered},
       {"chamfered-tee", ChamferedTee},
       {"keyed-shaft", KeyedShaft},
       {"keyed-gear", KeyedGear},
       {"ring-gear", RingGear},
-      {"hexagon", Hexagon},
-      {"round-pins", RoundPins},
+      {"hexagon", AsDrawn(Hexagon)},
+      {"round-pins", AsDrawn(RoundPins)},
       {"ellipse", Ellipse},
-      {"oblique-bore", ObliqueBore},
-      {"oblique-slot", ObliqueSlot},
-      {"domed", Domed},
+      {"oblique-bore", AsDrawn(ObliqueBore)},
+      {"oblique-slot", AsDrawn(ObliqueSlot)},
+      {"domed", AsDrawn(Domed)},
       {"filleted", Filleted},
-      {"filleted-bore", FilletedBore},
-      {"exact", [] { return Rectangle(0); }},
-      {"rectangle", [] { return Rectangle(0.1); }},
+      {"filleted-bore", AsDrawn(FilletedBore)},
+      {"exact", [](double) { return Rectangle(0); }},
+      {"rectangle", [](double factor) { return Rectangle(0.1 * factor); }},
       {"tilted", Tilted},
       {"assembly", Assembled},
       {"two-mouths", TwoMouths},
-      {"too-large", [] { return Rectangle(-0.13); }}};
+      {"too-large", [](double) { return Rectangle(-0.13); }}};
   for (const auto& [name, draw] : kKinds) {
-    if (name == kind) return draw();
+    if (name == kind) return draw(looser);
   }
   throw std::invalid_argument("no kind of parts is called " + kind);
 }
@@ -534,38 +547,44 @@ PartPlacement Anyhow(std::uint64_t seed) {
 }
 
 std::vector<PartKind> PartKinds() {
-  return {{"keyed", 0.15, 0.15, 12.0},
-          {"d-plug", 0.12, 0.12, 10.0},
-          {"usb-a", 0.2, 0.2, 12.0},
-          {"rj45", 0.13, 0.13, 14.0},
-          {"two-pin", 0.2, 0.2, 19.0},
-          {"three-pin", 0.2, 0.2, 22.0},
-          {"gear", 0.1, 0.1, 18.0, true},
-          {"hex-socket", 0.1, 0.1, 8.0, true},
-          {"taper", 0.0, 0.0, 0.0},
-          {"tilted", 0.1, 0.1, 9.0},
-          {"chamfered", 0.2, 0.2, 12.0},
-          {"chamfered-tee", 0.2, 0.2, 12.0},
-          {"shell", 0.2, 0.2, 11.9},
-          {"assembly", 0.15, 0.15, 12.0, false, true},
-          {"keyed-shaft", 0.1, 0.1, 12.0},
-          {"keyed-gear", 0.1, 0.1, 18.0, true},
-          {"ring-gear", 0.0, 0.0, 10.0},
-          {"hexagon", 0.1, 0.1, 11.0},
-          {"round-pins", 0.15, 0.15, 12.0},
-          {"ellipse", 0.15, 0.15, 10.0},
-          {"domed", 0.12, 0.12, 15.0, false, false, true},
-          {"filleted", 0.12, 0.12, 12.0, false, false, true},
-          {"filleted-bore", 0.1, 0.1, 12.0, false, false, true},
-          {"oblique-bore", 0.1, 0.1, 0.0},
-          {"oblique-slot", 0.15, 0.15, 0.0}};
+  std::vector<PartKind> kinds = {{"keyed", 0.15, 0.15, 12.0},
+                                 {"d-plug", 0.12, 0.12, 10.0},
+                                 {"usb-a", 0.2, 0.2, 12.0},
+                                 {"rj45", 0.13, 0.13, 14.0},
+                                 {"two-pin", 0.2, 0.2, 19.0},
+                                 {"three-pin", 0.2, 0.2, 22.0},
+                                 {"gear", 0.1, 0.1, 18.0, true},
+                                 {"hex-socket", 0.1, 0.1, 8.0, true},
+                                 {"taper", 0.0, 0.0, 0.0},
+                                 {"tilted", 0.1, 0.1, 9.0},
+                                 {"chamfered", 0.2, 0.2, 12.0},
+                                 {"chamfered-tee", 0.2, 0.2, 12.0},
+                                 {"shell", 0.2, 0.2, 11.9},
+                                 {"assembly", 0.15, 0.15, 12.0, false, true},
+                                 {"keyed-shaft", 0.1, 0.1, 12.0},
+                                 {"keyed-gear", 0.1, 0.1, 18.0, true},
+                                 {"ring-gear", 0.0, 0.0, 10.0},
+                                 {"hexagon", 0.1, 0.1, 11.0},
+                                 {"round-pins", 0.15, 0.15, 12.0},
+                                 {"ellipse", 0.15, 0.15, 10.0},
+                                 {"domed", 0.12, 0.12, 15.0, false, false, true},
+                                 {"filleted", 0.12, 0.12, 12.0, false, false, true},
+                                 {"filleted-bore", 0.1, 0.1, 12.0, false, false, true},
+                                 {"oblique-bore", 0.1, 0.1, 0.0},
+                                 {"oblique-slot", 0.15, 0.15, 0.0}};
+  const std::vector<std::string> scalable = {"keyed",      "d-plug",    "rj45",          "two-pin",  "three-pin",
+                                             "tilted",     "chamfered", "chamfered-tee", "assembly", "keyed-shaft",
+                                             "keyed-gear", "ring-gear", "ellipse",       "filleted"};
+  for (PartKind& kind : kinds)
+    kind.scalable_clearance = std::find(scalable.begin(), scalable.end(), kind.name) != scalable.end();
+  return kinds;
 }
 
 PartFiles WriteParts(const std::string& kind, const std::filesystem::path& folder, const std::string& format,
                      const PartPlacement& placement) {
-  Pair pair = Draw(kind);
-  pair.tool = Placed(pair.tool, placement.tool);
-  pair.target = Placed(pair.target, placement.target);
+  Pair pair = Draw(kind, placement.looser);
+  pair.tool = Placed(Scaled(pair.tool, placement.scale), placement.tool);
+  pair.target = Placed(Scaled(pair.target, placement.scale), placement.target);
   std::filesystem::create_directories(folder);
   if (format == "assembly") {
     BRep_Builder builder;

@@ -16,8 +16,9 @@ struct PartKind {
   double clearance_y_mm = 0.0;
   double depth_mm = 0.0;  ///< from mouth to fully in; 0: not asserted
   bool tool_has_opening = false;
-  bool assembled = false;  ///< both stand as assembled
-  bool fine = false;       ///< of thousands of triangles
+  bool assembled = false;           ///< both stand as assembled
+  bool fine = false;                ///< of thousands of triangles
+  bool scalable_clearance = false;  ///< PartPlacement::looser holds
 };
 
 /// The kinds that can be drawn.
@@ -27,12 +28,14 @@ struct PartFiles {
   std::string tool;  ///< as `--tool` takes it
   std::string target;
 };
-/// Where the CAD frames of the parts lie, and how finely their triangles are made.
+/// Where the CAD frames of the parts lie, how large they are, and how finely their triangles are made.
 struct PartPlacement {
   Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();  ///< of the part as drawn, in its frame; millimetres
   Eigen::Isometry3d target = Eigen::Isometry3d::Identity();
   double facet_mm = 0.002;  ///< how far triangles may be off the surface
   double facet_rad = 0.1;
+  double scale = 1.0;   ///< of all sizes, clearances too
+  double looser = 1.0;  ///< a factor of the clearances alone, of the kinds that are `scalable_clearance`
 };
 /// The tool turned about its axis against the target's frame.
 PartPlacement RolledBy(double degrees);
