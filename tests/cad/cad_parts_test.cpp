@@ -313,7 +313,6 @@ TEST_F(CadParts, AKeyIsFoundHoweverItIsTurnedAndHoweverLargeItIs) {
     placement.scale = drawn.scale;
     placement.looser = drawn.looser;
     for (const char* kind : {"keyed", "rectangle"}) {
-      const double looser = kind == std::string("keyed") ? drawn.looser : 1.0;
       const PartFiles files = WriteParts(kind, folder_, "step", placement);
       const TriangleMesh tool = Read(files.tool).mesh;
       const TriangleMesh target = Read(files.target).mesh;
@@ -321,7 +320,7 @@ TEST_F(CadParts, AKeyIsFoundHoweverItIsTurnedAndHoweverLargeItIs) {
         const Alignment alignment = FindAlignment(tool, target);
         const Mating mating =
             MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
-        const double drawn_mm = (kind == std::string("keyed") ? 0.15 : 0.1) * drawn.scale * looser;
+        const double drawn_mm = (kind == std::string("keyed") ? 0.15 : 0.1) * drawn.scale * drawn.looser;
         EXPECT_NEAR(1000 * mating.clearance_m.x(), drawn_mm, 0.002) << kind << ' ' << drawn.roll_deg;
         EXPECT_NEAR(1000 * mating.clearance_m.y(), drawn_mm, 0.002) << kind << ' ' << drawn.roll_deg;
       }) << kind
