@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <csignal>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -136,7 +137,10 @@ RawPart ReadApart(const std::filesystem::path& file, const std::string& library,
       }
     });
   } catch (const ChildDied& died) {
-    throw InputError(file.string(), fmt::format("{} dies of it (signal {})", library, died.signal), kMend);
+    throw InputError(file.string(),
+                     died.signal == SIGXCPU ? fmt::format("{} comes to no end with it", library)
+                                            : fmt::format("{} dies of it (signal {})", library, died.signal),
+                     kMend);
   }
   return Unpack(file, bytes);
 }

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,7 +17,7 @@
 namespace feeler::cad {
 namespace {
 
-[[noreturn]] void Serve(int pipe, pid_t parent, const std::function<std::string()>& work) {
+[[noreturn]] void Serve(int pipe, pid_t parent, const std::function<std::string()>& work, unsigned most_cpu_s) {
   // What a library has to say is not for who reads our messages.
   if (const int nowhere = open("/dev/null", O_WRONLY); nowhere >= 0) {
     dup2(nowhere, STDOUT_FILENO);
@@ -24,6 +25,9 @@ namespace {
   }
   // Whoever ends the parent ends this.
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) std::signal(number, SIG_DFL);
+  std::signal(SIGXCPU, SIG_DFL);
+  const rlimit limit{most_cpu_s, most_cpu_s + 1};  // its own clock begins with it
+  setrlimit(RLIMIT_CPU, &limit);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
   std::string bytes;
@@ -49,7 +53,7 @@ int Wait(pid_t child) {
 
 }  // namespace
 
-std::string RunApart(const std::function<std::string()>& work) {
+std::string RunApart(const std::function<std::string()>& work, unsigned most_cpu_s) {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) throw std::bad_alloc();
   std::fflush(nullptr);
@@ -57,7 +61,7 @@ std::string RunApart(const std::function<std::string()>& work) {
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
-    Serve(ends[1], parent, work);
+    Serve(ends[1], parent, work, most_cpu_s);
   }
   close(ends[1]);
   if (child < 0) {

@@ -41,6 +41,19 @@ TEST(RunApart, NamesTheSignalThatEndsIt) {
   EXPECT_THROW(RunApart([]() -> std::string { throw std::bad_alloc(); }), std::bad_alloc);
 }
 
+TEST(RunApart, WhatComesToNoEndIsEnded) {
+  try {
+    RunApart(
+        []() -> std::string {
+          for (;;) getpid();
+        },
+        1);
+    ADD_FAILURE();
+  } catch (const ChildDied& died) {
+    EXPECT_EQ(died.signal, SIGXCPU);
+  }
+}
+
 TEST(RunApart, ASignalEndsBoth) {
   struct sigaction act {};
   struct sigaction before {};

@@ -28,7 +28,7 @@
 namespace feeler::fuzz {
 namespace {
 
-constexpr unsigned kHang_s = 60;
+constexpr unsigned kHang_s = 200;          // longer than libraries are given (RunApart)
 constexpr std::uint64_t kKeepEach = 5000;  // inputs between two states on disk
 
 struct Options {
