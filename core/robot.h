@@ -86,6 +86,9 @@ struct ContactResponse {
   double damping_ratio = 1.0;      ///< of that contact; 0: elastic
   double reaction_time_s = 0.004;  ///< from a force that counts as a contact until the tool is being stopped
   double force_noise_n = 0.0;      ///< standard deviation of a force reading
+  /// With which the drive pushes on against the friction of its joints while the tool moves freely: comes on top of
+  /// what the contact gives, N.
+  double push_n = 0.0;
 
   /// What an obstacle has to stop.
   double mass_kg() const { return std::min(held_mass_kg, kOfFreeMass * free_mass_kg); }

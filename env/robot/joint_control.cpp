@@ -17,7 +17,7 @@ void FrictionObserver::BeforeStep(const JointVector& qd_rad_s, const JointVector
 }
 
 void FrictionObserver::AfterStep(const World& world, const JointVector& qd_rad_s, const Wrench& contact_wrench,
-                                 const Matrix6& jacobian, const Eigen::Vector3d& wrist_m_s2) {
+                                 const Matrix6& jacobian, bool free, const Eigen::Vector3d& wrist_m_s2) {
   if (!options_.enabled) return;
   const double dt = world.timestep_s();
   Vector6 wrench;
@@ -28,6 +28,10 @@ void FrictionObserver::AfterStep(const World& world, const JointVector& qd_rad_s
   if (!wrist_m_s2.isZero(0.0)) unexplained += world.WristReaction(wrist_m_s2);
   estimate_ += options_.bandwidth_rad_s * dt * (unexplained - estimate_);
   estimate_ = estimate_.cwiseMin(options_.limit_nm).cwiseMax(-options_.limit_nm);
+  // What a contact leaves in the estimate is gone after some of its time constants.
+  constexpr double kTimeConstants = 6.0;
+  free_s_ = free ? free_s_ + dt : 0.0;
+  if (free_s_ * options_.bandwidth_rad_s > kTimeConstants) most_ = most_.cwiseMax(estimate_.cwiseAbs());
 }
 
 }  // namespace feeler::env

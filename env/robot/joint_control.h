@@ -41,19 +41,28 @@ class FrictionObserver {
   FrictionObserver() : FrictionObserver(Options()) {}
   explicit FrictionObserver(const Options& options) : options_(options) {}
 
-  void Reset() { estimate_.setZero(); }
+  void Reset() {
+    estimate_.setZero();
+    most_.setZero();
+    free_s_ = 0.0;
+  }
   /// Before a step: remembers what the torques should do.
   void BeforeStep(const JointVector& qd_rad_s, const JointVector& bias_nm);
   /// After it: `contact_wrench` as measured over the step, `jacobian` of the tool.
+  /// `free`: nothing is touched.
   /// `wrist_m_s2`: of the tool against the arm, as the wrist measures it.
   void AfterStep(const World& world, const JointVector& qd_rad_s, const Wrench& contact_wrench, const Matrix6& jacobian,
-                 const Eigen::Vector3d& wrist_m_s2 = Eigen::Vector3d::Zero());
+                 bool free = false, const Eigen::Vector3d& wrist_m_s2 = Eigen::Vector3d::Zero());
   /// To be subtracted from the commanded torque, Nm.
   const JointVector& estimate_nm() const { return estimate_; }
+  /// The most that it has estimated for each joint since Reset while the robot moved freely, Nm, none negative.
+  const JointVector& most_nm() const { return most_; }
 
  private:
   Options options_;
   JointVector estimate_ = JointVector::Zero();
+  JointVector most_ = JointVector::Zero();
+  double free_s_ = 0.0;  ///< since something was touched
   JointVector qd_before_ = JointVector::Zero();
   JointVector bias_before_ = JointVector::Zero();
 };

@@ -121,6 +121,7 @@ void SimulatedRobot::StepOnce(const JointVector& torque_nm) {
   }
   Sense();
   memory_.friction.AfterStep(world_, world_.qd_rad_s(), memory_.sensor.raw(), jacobian,
+                             memory_.sensor.exact().force_n.isZero(0.0),
                              (world_.WristVelocity() - wrist_m_s) / world_.timestep_s());
 
   ++memory_.statistics.steps;

@@ -193,6 +193,8 @@ class SimulatedRobot : public Robot {
   PoseTrajectory Line(const Pose& goal, double speed_m_s, double acceleration_m_s2) const;
   /// Joint references along a trajectory; slows it to the joints' speed limits. Empty when a pose is out of reach.
   std::optional<PoseTrajectory> Reachable(const PoseTrajectory& trajectory) const;
+  /// The force along `direction` with which the drive overcomes the friction of the joints, as the robot stands.
+  double Push(const Eigen::Vector3d& direction) const;
   /// With a contact that acts on this mobility of the tool (J M^-1 J^T).
   ContactResponse ResponseOf(const Matrix6& mobility, const Eigen::Vector3d& direction) const;
   MotionResult FollowLine(const PoseTrajectory& trajectory, const Watch& watch);

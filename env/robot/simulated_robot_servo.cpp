@@ -80,6 +80,19 @@ ContactResponse SimulatedRobot::Contact(const Eigen::Vector3d& direction) const 
                    2.0 * world_.timestep_s() + memory_.noise.force_delay_s, options_.tracking);
 }
 
+double SimulatedRobot::Push(const Eigen::Vector3d& direction) const {
+  // What the observer finds in joints without friction: its own error.
+  constexpr double kNoFriction_nm = 0.05;
+  const JointVector felt_nm =
+      (memory_.friction.most_nm().array() < kNoFriction_nm).select(0.0, memory_.friction.most_nm());
+  if (felt_nm.isZero(0.0)) return 0.0;
+  // The power of the joints is that of the force: F v = sum of |q'| friction.
+  Vector6 twist = Vector6::Zero();
+  twist.head<3>() = direction;
+  const JointVector per_m = frame_.jacobian.partialPivLu().solve(twist);
+  return per_m.allFinite() ? per_m.cwiseAbs().dot(felt_nm) : 0.0;
+}
+
 ContactResponse SimulatedRobot::ResponseOf(const Matrix6& mobility, const Eigen::Vector3d& direction) const {
   const mjModel& model = world_.model();
   // MuJoCo pushes with the acceleration -b v - k r, taken on by the share `impedance` (its manual, "Solver
@@ -102,6 +115,7 @@ ContactResponse SimulatedRobot::ResponseOf(const Matrix6& mobility, const Eigen:
   contact.free_mass_kg = 1.0 / direction.dot(mobility.topLeftCorner<3, 3>() * direction);
   contact.force_noise_n = memory_.noise.force_noise_n;
   contact.reaction_time_s = 2.0 * world_.timestep_s() + memory_.noise.force_delay_s;
+  contact.push_n = Push(direction);
   if (!std::isfinite(time_constant_s)) return contact;
   const double stiffness = 1.0 / std::pow(largest_impedance * time_constant_s * damping_ratio, 2);  // per kg
   const double damping = 2.0 / (largest_impedance * time_constant_s);

@@ -211,7 +211,7 @@ MotionReport Mover::ProbeOnce(Direction direction, double coordinate, const std:
   if (report.contact) ++record_.contacts;
   const double met_n = record_.moves.back().peak_force_n;
   if (met_n > options_.force_budget_n) {
-    excess = std::max(excess, met_n / (motion.speed_m_s * ForcePerSpeed(contact)));
+    excess = std::max(excess, (met_n - contact.push_n) / (motion.speed_m_s * ForcePerSpeed(contact)));
   }
   return report;
 }

@@ -485,6 +485,7 @@ ContactResponse RemoteRobot::Contact(const Eigen::Vector3d& direction) const {
     contact.damping_ratio = told->damping_ratio;
     contact.reaction_time_s = told->reaction_time_s;
     contact.force_noise_n = told->force_noise_n;
+    contact.push_n = told->push_n;
   } else {
     const Capabilities& stated = welcome_.capabilities;
     contact.held_mass_kg = contact.free_mass_kg = stated.effective_mass_kg;

@@ -71,8 +71,8 @@ class Robot(ABC):
 
     def contact(self, direction: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """What a contact met along a unit vector (world axes) is like as the robot stands: effective mass where the tool
-        cannot turn (kg), where it can (kg), stiffness of the parts (N/m), damping ratio, reaction time (s), force noise (N).
-        The speed of probes follows from it. None: a heavy arm with hard parts is assumed."""
+        cannot turn (kg), where it can (kg), stiffness of the parts (N/m), damping ratio, reaction time (s), force noise (N)
+        and, optional, with what force the drive pushes against the friction of its joints in free motion (N). The speed of probes follows from it. None: a heavy arm with hard parts is assumed."""
         return None
 
     def look(self) -> CameraView:

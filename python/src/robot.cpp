@@ -104,12 +104,13 @@ class PythonRobot final : public Robot {
     return Ask(raised_, "robot", "contact", [&] {
       const nb::object told = Attr("contact")(direction);
       if (told.is_none()) return Robot::Contact(direction);
-      const auto v = nb::cast<Eigen::Matrix<double, 6, 1>>(told);
-      if (!v.allFinite() || (v.array() < 0.0).any()) {
-        throw InputError("robot.contact", "is not six finite numbers, none below zero",
-                         "give held mass, free mass, stiffness, damping ratio, reaction time, force noise, or None");
+      const auto v = nb::cast<Eigen::VectorXd>(told);
+      if (v.size() < 6 || v.size() > 7 || !v.allFinite() || (v.array() < 0.0).any()) {
+        throw InputError("robot.contact", "is not six or seven finite numbers, none below zero",
+                         "give held mass, free mass, stiffness, damping ratio, reaction time, force noise and, where "
+                         "the drive pushes against friction, that force; or None");
       }
-      return ContactResponse{v[0], v[1], v[2], v[3], v[4], v[5]};
+      return ContactResponse{v[0], v[1], v[2], v[3], v[4], v[5], v.size() > 6 ? v[6] : 0.0};
     });
   }
   CameraView Look() override {
@@ -319,8 +320,9 @@ void BindSimulatedRobot(nb::module_& m) {
           "contact",
           [](const SimulatedRobot& r, const Eigen::Vector3d& direction) {
             const ContactResponse c = r.Contact(direction);
-            Eigen::Matrix<double, 6, 1> v;
-            v << c.held_mass_kg, c.free_mass_kg, c.stiffness_n_m, c.damping_ratio, c.reaction_time_s, c.force_noise_n;
+            Eigen::Matrix<double, 7, 1> v;
+            v << c.held_mass_kg, c.free_mass_kg, c.stiffness_n_m, c.damping_ratio, c.reaction_time_s, c.force_noise_n,
+                c.push_n;
             return v;
           },
           "direction"_a)

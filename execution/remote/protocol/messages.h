@@ -124,6 +124,7 @@ struct ContactReply {              ///< what a contact along a direction would b
   double damping_ratio = 1.0;      ///< of that contact; 0: elastic
   double reaction_time_s = 0.004;  ///< from a contact until the tool is being stopped
   double force_noise_n = 0.0;      ///< standard deviation of a force reading
+  double push_n = 0.0;             ///< of the drive against its own friction; left out where it is 0
 };
 struct PictureReply {
   CameraView view;

@@ -123,13 +123,15 @@ struct ReplyBody {
             {"state", StateJson(m.state)}};
   }
   json operator()(const ContactReply& m) const {
-    return {{"type", "contact"},
-            {"held_mass_kg", m.held_mass_kg},
-            {"free_mass_kg", m.free_mass_kg},
-            {"stiffness_n_m", m.stiffness_n_m},
-            {"damping_ratio", m.damping_ratio},
-            {"reaction_time_s", m.reaction_time_s},
-            {"force_noise_n", m.force_noise_n}};
+    json reply = {{"type", "contact"},
+                  {"held_mass_kg", m.held_mass_kg},
+                  {"free_mass_kg", m.free_mass_kg},
+                  {"stiffness_n_m", m.stiffness_n_m},
+                  {"damping_ratio", m.damping_ratio},
+                  {"reaction_time_s", m.reaction_time_s},
+                  {"force_noise_n", m.force_noise_n}};
+    if (m.push_n > 0.0) reply["push_n"] = m.push_n;
+    return reply;
   }
   json operator()(const PictureReply& m) const {
     const CameraView& view = m.view;
@@ -380,6 +382,7 @@ Reply ReplyOf(const std::string& type, const json& item) {
     response.damping_ratio = item["damping_ratio"].get<double>();
     response.reaction_time_s = item["reaction_time_s"].get<double>();
     response.force_noise_n = item["force_noise_n"].get<double>();
+    response.push_n = item.value("push_n", 0.0);
     return response;
   }
   if (type == "picture") return PictureReply{PictureOf(item)};

@@ -96,6 +96,7 @@ class NumberReader {
     if (next_ == numbers_.size()) RefuseMessage("has too few numbers");
     return numbers_[next_++];
   }
+  bool More() const { return next_ < numbers_.size(); }
   double Positive() {
     const double value = Number();
     if (!(value > 0.0)) RefuseMessage(fmt::format("number {} is not positive", next_ - 1));
@@ -291,13 +292,10 @@ struct ReplyNumbers {
   std::string operator()(const ContactReply& m) const {
     const ContactReply& r = m;
     NumberWriter out(kContactReply, seq);
-    return out.Put(r.held_mass_kg)
-        .Put(r.free_mass_kg)
-        .Put(r.stiffness_n_m)
-        .Put(r.damping_ratio)
-        .Put(r.reaction_time_s)
-        .Put(r.force_noise_n)
-        .Done();
+    out.Put(r.held_mass_kg).Put(r.free_mass_kg).Put(r.stiffness_n_m).Put(r.damping_ratio);
+    out.Put(r.reaction_time_s).Put(r.force_noise_n);
+    if (r.push_n > 0.0) out.Put(r.push_n);
+    return out.Done();
   }
   std::string operator()(const ErrorReply& m) const {
     int code = 6;
@@ -375,6 +373,7 @@ Framed<Reply> ReplyFromNumbers(std::string_view line) {
       r.damping_ratio = in.NotNegative();
       r.reaction_time_s = in.NotNegative();
       r.force_noise_n = in.NotNegative();
+      if (in.More()) r.push_n = in.NotNegative();
       framed.body = r;
       break;
     }

@@ -156,8 +156,12 @@ TEST_F(ControlTest, FrictionObserverFindsUnknownFriction) {
     reference.qd_rad_s = speed;
     observer.BeforeStep(world_.qd_rad_s(), world_.BiasTorque());
     world_.Step(ComputedTorque(world_, world_.q_rad(), world_.qd_rad_s(), reference, {}) - observer.estimate_nm());
-    observer.AfterStep(world_, world_.qd_rad_s(), {}, ToolJacobian(*scene_, world_.q_rad()));
+    observer.AfterStep(world_, world_.qd_rad_s(), {}, ToolJacobian(*scene_, world_.q_rad()), i >= 250);
+    if (i < 250) {
+      EXPECT_TRUE(observer.most_nm().isZero(0.0)) << "something is touched";
+    }
   }
+  EXPECT_LT((observer.most_nm() - friction).norm(), 0.1) << observer.most_nm().transpose();
   EXPECT_LT((observer.estimate_nm() + friction).norm(), 0.1) << observer.estimate_nm().transpose();
   EXPECT_LT((world_.q_rad() - start_ - speed * world_.time_s()).norm(), 1e-5);
 }

@@ -27,10 +27,12 @@ class ContactResponseTest : public ::testing::Test {
   void Place(const Eigen::Vector3d& displacement_m) {
     NoiseOptions noise = NoisePreset("ideal");
     noise.force_delay_s = delay_s_;
+    noise.joint_friction_nm = friction_ * NoisePreset("friction").joint_friction_nm;
     robot_.Reset(At(*scene_, ToolAt(*scene_, displacement_m)), scene_->task.world_T_target, noise,
                  RandomStream(1, 0, "sensor"));
   }
-  double delay_s_ = 0.0;  ///< of the force sensor
+  double delay_s_ = 0.0;   ///< of the force sensor
+  double friction_ = 0.0;  ///< of the joints, as a share of that of the preset
   Eigen::Vector3d InWorld(const Eigen::Vector3d& direction) const {
     return scene_->task.world_T_target.linear() * direction;
   }
@@ -105,6 +107,31 @@ TEST_F(ContactResponseTest, AnEdgeThatIsBarelyMetKeepsTheBudget) {
     }
     if (budget_n < 50.0) {
       EXPECT_GT(worst_face_on_n, budget_n) << "the speed for a face would not do";
+    }
+  }
+}
+
+TEST_F(ContactResponseTest, FrictionOfTheJointsIsCountedWith) {
+  for (const double share : {0.2, 0.5, 1.0}) {
+    friction_ = share;
+    for (const Wall& wall : walls_) {
+      Place(wall.start_m);
+      EXPECT_EQ(robot_.Contact(InWorld(wall.direction)).push_n, 0.0) << "it has not moved";
+      Pose back = robot_.ToolPose();
+      const Pose start = back;
+      back.translation() -= 0.01 * InWorld(wall.direction);
+      robot_.LinearMove(back, 0.1, 10.0);
+      robot_.LinearMove(start, 0.1, 10.0);
+      const ContactResponse contact = robot_.Contact(InWorld(wall.direction));
+      EXPECT_GT(contact.push_n, 1.0);
+      GuardedMotion motion;
+      motion.direction = InWorld(wall.direction);
+      motion.distance_m = 0.02;
+      motion.speed_m_s = execution::SpeedWithinBudget(contact, 25.0);
+      const MotionResult result = robot_.Guarded(motion);
+      EXPECT_TRUE(result.contact);
+      EXPECT_LE(result.peak_force_n, 25.0) << wall.direction.transpose() << ", " << share;
+      EXPECT_GE(result.peak_force_n, 5.0);
     }
   }
 }

@@ -82,7 +82,9 @@ std::vector<Reply> SomeReplies() {
   verdict.world_T_true = SomePose();
   verdict.reason = "too shallow";
   verdict.replay = {{"period_s", 0.05}};
-  return {welcome, StateReply{SomeState()}, result, ContactReply{}, picture, episode, verdict, ErrorReply{"busy", "x"}};
+  ContactReply contact;
+  contact.push_n = 12.5;
+  return {welcome, StateReply{SomeState()}, result, ContactReply{}, contact, picture, episode, verdict, ErrorReply{"busy", "x"}};
 }
 
 bool HasNumbers(const Request& r) {
