@@ -2,19 +2,20 @@
 // byte but the times measured; a dry run moves nothing; what goes wrong to order ends an episode with its true reason,
 // and the next one is sound; bad input is one line; the executor's binary links no simulator.
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/cli/run_feeler.h"
@@ -35,27 +36,14 @@ const std::string& CubeDatabase() {
   return path;
 }
 
-/// A port that nobody listens on at this moment.
-int FreePort() {
-  const int s = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(bind(s, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  socklen_t size = sizeof address;
-  getsockname(s, reinterpret_cast<sockaddr*>(&address), &size);
-  close(s);
-  return ntohs(address.sin_port);
-}
-
 /// feeler simulate in the background, in lockstep, until it ends by itself or the object goes.
 class Simulation {
  public:
   /// `extents`: what it was started with; empty: nothing.
   explicit Simulation(const std::vector<std::string>& more, const std::string& extents = "4x4x4")
-      : address_("127.0.0.1:" + std::to_string(FreePort())), folder_(ScratchFolder("simulation")) {
-    std::vector<std::string> arguments = {FEELER_BINARY, "simulate", "--task", "plug",
-                                          "--listen",    address_,   "--json", "--lockstep"};
+      : folder_(ScratchFolder("simulation")) {
+    std::vector<std::string> arguments = {FEELER_BINARY, "simulate",    "--task", "plug",
+                                          "--listen",    "127.0.0.1:0", "--json", "--lockstep"};
     if (!extents.empty()) arguments.insert(arguments.end(), {"--extents", extents});
     arguments.insert(arguments.end(), more.begin(), more.end());
     child_ = fork();
@@ -68,6 +56,7 @@ class Simulation {
       execv(FEELER_BINARY, argv.data());
       _exit(127);
     }
+    address_ = WhereItListens();
   }
   ~Simulation() {
     if (child_ > 0) Stop();
@@ -88,6 +77,22 @@ class Simulation {
   }
 
  private:
+  /// HOST:PORT of its line on stderr; from then on it ends by itself when it is told to.
+  std::string WhereItListens() const {
+    const std::string lead = "listens on ";
+    for (int waited_ms = 0; waited_ms < 30'000; waited_ms += 5) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (!std::filesystem::exists(folder_ + "/err")) continue;
+      const std::string said = ReadFile(folder_ + "/err");
+      const size_t start = said.find(lead);
+      const size_t end = said.find(',', start);
+      if (start != std::string::npos && end != std::string::npos)
+        return said.substr(start + lead.size(), end - start - lead.size());
+    }
+    ADD_FAILURE() << "the simulation does not listen";
+    return "127.0.0.1:1";
+  }
+
   std::string address_;
   std::string folder_;
   pid_t child_ = 0;
