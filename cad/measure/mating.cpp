@@ -88,15 +88,15 @@ double SnappedToLevel(const TriangleMesh& mesh, double height_m) {
   return snapped;
 }
 
-/// The largest displacement along both axes at once with which the tool still enters.
-double MouthPlay(const Player& player, double lift_m, const Eigen::Vector2d& half_m) {
-  double play = half_m.minCoeff();
+/// The largest share of the play along each axis alone, `half_m`, with which the tool displaced along both at once
+/// still enters.
+Eigen::Vector2d MouthPlay(const Player& player, double lift_m, const Eigen::Vector2d& half_m) {
+  double share = 1.0;
   for (int corner = 0; corner < 4; ++corner) {
-    const Eigen::Vector3d diagonal(corner % 2 == 0 ? 1 : -1, corner / 2 == 0 ? 1 : -1, 0);
-    play = std::min(play,
-                    player.slide().Travel(lift_m * kUp, diagonal.normalized(), 2 * half_m.maxCoeff()) / std::sqrt(2.0));
+    const Eigen::Vector3d way((corner % 2 == 0 ? 1 : -1) * half_m.x(), (corner / 2 == 0 ? 1 : -1) * half_m.y(), 0);
+    share = std::min(share, player.slide().Travel(lift_m * kUp, way.normalized(), way.norm()) / way.norm());
   }
-  return play;
+  return share * half_m;
 }
 
 TriangleMesh TurnedAboutZ(const TriangleMesh& mesh, double angle) {

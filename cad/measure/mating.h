@@ -26,7 +26,8 @@ struct Mating {
   bool through = false;  ///< nothing stops the tool at this depth: the hole goes through
   Eigen::Vector2d clearance_m = Eigen::Vector2d::Zero();  ///< a side, the least of all depths but the mouth
   Eigen::Vector2d lead_in_m = Eigen::Vector2d::Zero();    ///< what the mouth allows beyond the clearance
-  double mouth_play_m = 0.0;   ///< the tool displaced by this along x and y at once, in any direction, still enters
+  /// The tool displaced by this along x and y at once, either way, still enters.
+  Eigen::Vector2d mouth_play_m = Eigen::Vector2d::Zero();
   bool round = false;          ///< every turn about the axis fits
   std::vector<int> turns_deg;  ///< other turns that fit, of 60, 90, 120 ... degrees; empty: there is one way
   std::vector<Play> profile;   ///< from the mouth to the end

@@ -29,6 +29,12 @@ std::string Plain(double value) {
 
 std::string Plain(const Eigen::Vector3d& v) { return Plain(v.x()) + " " + Plain(v.y()) + " " + Plain(v.z()); }
 
+/// One number where both agree within a hundredth, else one per axis.
+std::string OneOrEach(const Eigen::Vector2d& v) {
+  if (v.minCoeff() >= 0.99 * v.maxCoeff()) return Plain(v.minCoeff());
+  return Plain(v.x()) + " " + Plain(v.y());
+}
+
 std::string Repeated(const std::string& value, std::size_t count) {
   std::string text = value;
   for (std::size_t i = 1; i < count; ++i) text += " " + value;
@@ -221,12 +227,12 @@ class Derivation {
 
   void Verdict() {
     const Eigen::Vector2d reach = mating_.clearance_m + mating_.lead_in_m;
-    const double lateral = std::floor(0.95 * mating_.mouth_play_m * 1e6) * 1e-6;
-    Add("feeler_tolerance_lateral", false, Plain(lateral),
-        fmt::format("0.95 of what enters along both axes at once ({:.4f} mm); clearance {:.4f} x {:.4f} mm a side, "
-                    "with lead-in {:.4f} x {:.4f} mm",
-                    1000 * mating_.mouth_play_m, 1000 * mating_.clearance_m.x(), 1000 * mating_.clearance_m.y(),
-                    1000 * reach.x(), 1000 * reach.y()));
+    const Eigen::Vector2d lateral = (0.95e6 * mating_.mouth_play_m).array().floor() * 1e-6;
+    Add("feeler_tolerance_lateral", false, OneOrEach(lateral),
+        fmt::format("0.95 of what enters along both axes at once ({:.4f} x {:.4f} mm); clearance {:.4f} x {:.4f} mm a "
+                    "side, with lead-in {:.4f} x {:.4f} mm",
+                    1000 * mating_.mouth_play_m.x(), 1000 * mating_.mouth_play_m.y(), 1000 * mating_.clearance_m.x(),
+                    1000 * mating_.clearance_m.y(), 1000 * reach.x(), 1000 * reach.y()));
     const double vertical = std::min(0.002, 0.2 * Depth());
     Add("feeler_tolerance_vertical", false, Plain(vertical), "a fifth of the depth, 2 mm at most");
     // Tilted by this, the tool takes up its clearance over the depth; 0.03 is what a good gripper holds.

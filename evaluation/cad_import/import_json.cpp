@@ -82,7 +82,7 @@ nlohmann::json ImportJson(const ImportOptions& options, const ImportedTask& task
             {"clearance_m", Vector2(mating.clearance_m)},
             {"clearance_pieces_m", Vector2(task.pieces_clearance_m)},
             {"lead_in_m", Vector2(mating.lead_in_m)},
-            {"mouth_play_m", Tidy(mating.mouth_play_m)},
+            {"mouth_play_m", Vector2(mating.mouth_play_m)},
             {"round", mating.round},
             {"turns_that_fit_deg", mating.turns_deg},
             {"openings", mating.openings.size()},

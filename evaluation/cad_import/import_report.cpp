@@ -143,7 +143,8 @@ std::string MatingTable(const ImportedTask& task) {
               fmt::format("{:.4f} mm in x, {:.4f} mm in y", 1000 * task.pieces_clearance_m.x(),
                           1000 * task.pieces_clearance_m.y()));
   html += Row("lead-in", fmt::format("{:.4f} mm in x, {:.4f} mm in y", 1000 * m.lead_in_m.x(), 1000 * m.lead_in_m.y()));
-  html += Row("enters when displaced along both axes by", Millimetres(m.mouth_play_m));
+  html += Row("enters when displaced along both axes by",
+              fmt::format("{:.4f} mm in x, {:.4f} mm in y", 1000 * m.mouth_play_m.x(), 1000 * m.mouth_play_m.y()));
   std::string turns = m.round ? "every turn fits: round" : m.turns_deg.empty() ? "one way only: keyed" : "turned by";
   if (!m.round) {
     for (const int degrees : m.turns_deg) turns += fmt::format(" {}", degrees);

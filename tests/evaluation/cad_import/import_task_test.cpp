@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -119,6 +120,40 @@ void TurnInsideOut(const std::string& file) {
                      bytes.begin() + static_cast<std::ptrdiff_t>(at + 2 * kCorner));
   }
   std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// Makes the part of a binary STL thinner along x, about the origin.
+void Thin(const std::string& file, float factor) {
+  std::string bytes = env::ReadTextFile(file);
+  constexpr std::size_t kHeader = 84;
+  constexpr std::size_t kTriangle = 50;
+  for (std::size_t at = kHeader; at + kTriangle <= bytes.size(); at += kTriangle) {
+    for (std::size_t corner = 1; corner <= 3; ++corner) {
+      float x = 0.0F;
+      std::memcpy(&x, bytes.data() + at + 12 * corner, sizeof x);
+      x *= factor;
+      std::memcpy(bytes.data() + at + 12 * corner, &x, sizeof x);
+    }
+  }
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST_F(ImportTaskTest, ToleratesAlongEachAxisWhatEntersThere) {
+  ImportOptions options = OptionsFor("rectangle", "stl");
+  const ImportedTask as_drawn = ImportTask(options);
+  const Tolerance drawn = env::LoadTask(as_drawn.task_file.string()).task.tolerance;
+  Thin(options.tool, 0.97F);
+  const ImportedTask thinned = ImportTask(options);
+  const Tolerance thin = env::LoadTask(thinned.task_file.string()).task.tolerance;
+  const Eigen::Vector2d enters_m = thinned.mating.clearance_m + thinned.mating.lead_in_m;
+  const Eigen::Vector2d gained_m = enters_m - as_drawn.mating.clearance_m - as_drawn.mating.lead_in_m;
+  EXPECT_GT(gained_m.maxCoeff(), 5e-5);
+  EXPECT_NEAR(gained_m.minCoeff(), 0.0, 2e-6) << "along one axis alone";
+  // A rectangle enters at the corners of what enters along each axis.
+  for (const int axis : {0, 1}) {
+    EXPECT_NEAR(thin.Lateral(axis), 0.95 * enters_m[axis], 4e-6) << axis;
+    EXPECT_GE(thin.Lateral(axis), drawn.Lateral(axis) - 4e-6) << axis;
+  }
 }
 
 TEST_F(ImportTaskTest, StatesWhatWasMendedAndTheForceBudget) {
