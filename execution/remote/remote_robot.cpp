@@ -479,13 +479,7 @@ ContactResponse RemoteRobot::Contact(const Eigen::Vector3d& direction) const {
   const std::optional<Reply> reply = const_cast<RemoteRobot*>(this)->TryExchange(ContactRequest{direction});
   ContactResponse contact = Robot::Contact(direction);
   if (const auto* told = reply ? std::get_if<ContactReply>(&*reply) : nullptr) {
-    contact.held_mass_kg = told->held_mass_kg;
-    contact.free_mass_kg = told->free_mass_kg;
-    contact.stiffness_n_m = told->stiffness_n_m;
-    contact.damping_ratio = told->damping_ratio;
-    contact.reaction_time_s = told->reaction_time_s;
-    contact.force_noise_n = told->force_noise_n;
-    contact.push_n = told->push_n;
+    contact = *told;
   } else {
     const Capabilities& stated = welcome_.capabilities;
     contact.held_mass_kg = contact.free_mass_kg = stated.effective_mass_kg;

@@ -276,9 +276,7 @@ std::optional<SessionEnd> RobotServer::Handle(const Framed<Request>& framed) {
     } else if (std::holds_alternative<ZeroRequest>(request)) {
       served_.robot.ZeroWrench();
     } else if (const auto* contact = std::get_if<ContactRequest>(&request)) {
-      const ContactResponse own = served_.robot.Contact(contact->direction);
-      Send(framed.seq, ContactReply{own.held_mass_kg, own.free_mass_kg, own.stiffness_n_m, own.damping_ratio,
-                                    own.reaction_time_s, own.force_noise_n, own.push_n});
+      Send(framed.seq, served_.robot.Contact(contact->direction));
       return std::nullopt;
     } else if (std::holds_alternative<LookRequest>(request)) {
       Send(framed.seq, PictureReply{served_.robot.Look()});

@@ -117,15 +117,7 @@ struct ResultReply {
   MotionResult result;
   RobotState state;
 };
-struct ContactReply {              ///< what a contact along a direction would be like, as the robot stands
-  double held_mass_kg = 25.0;      ///< what an obstacle has to stop where the tool cannot turn
-  double free_mass_kg = 25.0;      ///< where it can
-  double stiffness_n_m = 6e4;      ///< of the parts in contact, force per indentation
-  double damping_ratio = 1.0;      ///< of that contact; 0: elastic
-  double reaction_time_s = 0.004;  ///< from a contact until the tool is being stopped
-  double force_noise_n = 0.0;      ///< standard deviation of a force reading
-  double push_n = 0.0;             ///< of the drive against its own friction; left out where it is 0
-};
+using ContactReply = ContactResponse;  ///< what a contact along a direction would be like, as the robot stands
 struct PictureReply {
   CameraView view;
 };
