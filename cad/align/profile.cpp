@@ -101,18 +101,24 @@ Profile ProfileOf(const SlabLoop& loop) {
   profile.farthest_m.assign(kBins, 0.0);
   profile.nearest_m.assign(kBins, std::numeric_limits<double>::infinity());
   constexpr double kBin = 2 * std::numbers::pi / kBins;
+  constexpr double kAtCorner = 1e-6;  // of a bin: far more than rounding
+  const auto extend = [&](std::size_t bin, double radius) {
+    profile.farthest_m[bin % kBins] = std::max(profile.farthest_m[bin % kBins], radius);
+    profile.nearest_m[bin % kBins] = std::min(profile.nearest_m[bin % kBins], radius);
+  };
   for (std::size_t i = 0; i < loop.size(); ++i) {
     Eigen::Vector2d a = loop[i].middle - profile.middle;
     Eigen::Vector2d b = loop[(i + 1) % loop.size()].middle - profile.middle;
+    // A ray through a corner may be taken for beyond both sides that meet there.
+    const double corner = Folded(std::atan2(a.y(), a.x()), 2 * std::numbers::pi) / kBin;
+    if (std::abs(corner - std::round(corner)) < kAtCorner)
+      extend(static_cast<std::size_t>(std::round(corner)), a.norm());
     if (a.x() * b.y() - a.y() * b.x() < 0) std::swap(a, b);
     const double from = Folded(std::atan2(a.y(), a.x()), 2 * std::numbers::pi);
     const double turn = std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
     const auto end = static_cast<std::size_t>(std::ceil((from + turn) / kBin));
-    for (auto bin = static_cast<std::size_t>(std::ceil(from / kBin)); bin < end; ++bin) {
-      const double radius = RadiusAt(a, b, static_cast<double>(bin) * kBin);
-      profile.farthest_m[bin % kBins] = std::max(profile.farthest_m[bin % kBins], radius);
-      profile.nearest_m[bin % kBins] = std::min(profile.nearest_m[bin % kBins], radius);
-    }
+    for (auto bin = static_cast<std::size_t>(std::ceil(from / kBin)); bin < end; ++bin)
+      extend(bin, RadiusAt(a, b, static_cast<double>(bin) * kBin));
   }
   for (double& radius : profile.nearest_m) radius = std::isfinite(radius) ? radius : 0.0;
   profile.farthest_sorted_m = profile.farthest_m;
