@@ -1,5 +1,6 @@
 #include "feeler/cad/align/candidates.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -130,17 +131,49 @@ std::vector<Direction> BentEdgesOf(const TriangleMesh& mesh) {
     const double length = along.norm();
     if (length > 1e-6) edges.push_back({along / length, length});
   }
-  // The lines of a cone, or of what tapers, are not parallel.
-  constexpr int kLeastEdges = 3;
-  return Gathered(std::move(edges), kExactly, kLeastEdges);
+  return edges;
+}
+
+/// The direction to which the faces along a direction are most nearly parallel; itself where they lie all in one.
+Eigen::Vector3d AlongFaces(const TriangleMesh& mesh, const Eigen::Vector3d& direction) {
+  constexpr double kAlong = 2e-3;  ///< sine of the angle between such a face and the direction
+  constexpr double kSpread = 0.01;
+  Eigen::Vector3d along = direction;
+  for (int round = 0; round < 3; ++round) {
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (int t = 0; t < mesh.size(); ++t) {
+      const Eigen::Vector3d area = AreaVector(mesh, t);
+      const double size = area.norm();
+      if (size >= 1e-14 && std::abs(area.dot(along)) < kAlong * size) spread += area * area.transpose() / size;
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);  // eigenvalues increase
+    if (solver.eigenvalues()[1] < kSpread * solver.eigenvalues()[2]) return direction;
+    along = solver.eigenvectors().col(0) * (solver.eigenvectors().col(0).dot(along) < 0 ? -1.0 : 1.0);
+  }
+  return along;
+}
+
+/// The directions in which most of the length of bent edges runs. The edges of a bore whose rim slants are not quite
+/// parallel, for the rim has corners of its own: the faces between them tell better.
+std::vector<Direction> EdgeDirectionsOf(const TriangleMesh& mesh) {
+  constexpr int kLeastEdges = 3;  // the lines of a cone, or of what tapers, are not parallel
+  constexpr double kParallel = 1e-5;
+  const std::vector<Direction> edges = BentEdgesOf(mesh);
+  std::vector<Direction> largest = Largest(Gathered(edges, kExactly, kLeastEdges), kLeastShare);
+  for (Direction& group : largest) {
+    const bool parallel = std::none_of(edges.begin(), edges.end(), [&](const Direction& edge) {
+      return std::abs(edge.unit.dot(group.unit)) >= kExactly && edge.unit.cross(group.unit).norm() > kParallel;
+    });
+    if (!parallel) group.unit = AlongFaces(mesh, group.unit);
+  }
+  return largest;
 }
 
 }  // namespace
 
 std::vector<Eigen::Vector3d> ShapeDirections(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> directions;
-  for (const std::vector<Direction>& some :
-       {Largest(NormalsOf(mesh), kLeastShare), Largest(BentEdgesOf(mesh), kLeastShare)}) {
+  for (const std::vector<Direction>& some : {Largest(NormalsOf(mesh), kLeastShare), EdgeDirectionsOf(mesh)}) {
     for (const Direction& d : some) {
       const bool known = std::any_of(directions.begin(), directions.end(), [&](const Eigen::Vector3d& other) {
         return std::abs(other.dot(d.unit)) > kSameDirection;
