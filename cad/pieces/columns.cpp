@@ -81,6 +81,23 @@ SlabLoop HullAround(const SlabLoop& a, const SlabLoop& b) {
   return loop;
 }
 
+/// What of a convex loop does not lie beyond a line through `a`.
+SlabLoop WithoutBeyond(const SlabLoop& loop, const Eigen::Vector2d& a, const Eigen::Vector2d& beyond) {
+  SlabLoop rest;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Eigen::Vector2d& p = loop[i].middle;
+    const Eigen::Vector2d& q = loop[(i + 1) % loop.size()].middle;
+    const double at_p = beyond.dot(p - a);
+    const double at_q = beyond.dot(q - a);
+    if (at_p <= 0) rest.push_back(loop[i]);
+    if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) {
+      const Eigen::Vector2d between = p + (q - p) * (at_p / (at_p - at_q));
+      rest.push_back({between, between, between});
+    }
+  }
+  return rest;
+}
+
 /// Widest outlines and narrowest holes of the slabs that were added.
 class Envelope {
  public:
@@ -96,6 +113,26 @@ class Envelope {
     outlines_ = before.outlines_;
     holes_ = before.holes_;
     return false;
+  }
+
+  /// Widens the outlines to points of the solid that lie beyond all of them by more than `allowed_m` says.
+  template <class Allowed>
+  void Cover(const std::vector<Eigen::Vector3d>& points, const Allowed& allowed_m) {
+    std::vector<SlabLoop> beyond(outlines_.size());
+    for (const Eigen::Vector3d& point : points) {
+      const Eigen::Vector2d p = point.head<2>();
+      double least = std::numeric_limits<double>::infinity();
+      std::size_t nearest = 0;
+      for (std::size_t i = 0; i < outlines_.size() && least > 0; ++i) {
+        const double off = Encloses(outlines_[i], p) ? 0.0 : OffLine(outlines_[i], p);
+        if (off < least) nearest = i;
+        least = std::min(least, off);
+      }
+      if (std::isfinite(least) && least > allowed_m(point)) beyond[nearest].push_back({p, p, p});
+    }
+    for (std::size_t i = 0; i < outlines_.size(); ++i) {
+      if (!beyond[i].empty()) outlines_[i] = HullAround(outlines_[i], beyond[i]);
+    }
   }
 
   std::vector<SlabLoop> loops() const {
@@ -152,14 +189,46 @@ class Envelope {
         met[i] = true;
         if (within) holes_[i] = section;
       }
+      for (std::size_t i = 0; i < holes_.size() && !found; ++i) {
+        auto rest = met[i] ? std::nullopt : Trimmed(holes_[i], {section});
+        found = rest && LiesWithin(*rest, section, slack_m_);
+        if (!found) continue;
+        met[i] = true;
+        holes_[i] = *std::move(rest);
+      }
       if (!found) return false;
     }
     std::vector<SlabLoop> all = outlines;
     all.insert(all.end(), holes.begin(), holes.end());
     for (std::size_t i = 0; i < holes_.size(); ++i) {
-      if (!met[i] && !IsAir(holes_[i], all)) return false;  // open to the side it may be
+      if (met[i] || IsAir(holes_[i], all)) continue;  // open to the side it may be
+      auto rest = Trimmed(holes_[i], all);
+      if (!rest || !IsAir(*rest, all)) return false;
+      holes_[i] = *std::move(rest);
     }
     return true;
+  }
+
+  /// A convex hole without what sides of other lines take away of it: where the facets of a bore are not quite parallel
+  /// its lines at two heights have other corners, and neither lies in the other. Sides that would take much are not of
+  /// its wall.
+  std::optional<SlabLoop> Trimmed(const SlabLoop& hole, const std::vector<SlabLoop>& lines) const {
+    const double most_m = 4 * slack_m_;
+    SlabLoop rest = HullAround(hole, hole);
+    if (!LiesWithin(rest, hole, slack_m_)) return std::nullopt;
+    for (const SlabLoop& line : lines) {
+      for (std::size_t i = 0; i < line.size(); ++i) {
+        const Eigen::Vector2d& a = line[i].middle;
+        const Eigen::Vector2d side = line[(i + 1) % line.size()].middle - a;
+        if (side.norm() < kOnSide_m) continue;
+        const Eigen::Vector2d inward = Eigen::Vector2d(-side.y(), side.x()).normalized();  // into the material
+        double deepest_m = 0.0;
+        for (const SlabPoint& p : rest) deepest_m = std::max(deepest_m, inward.dot(p.middle - a));
+        if (deepest_m > 0.0 && deepest_m <= most_m) rest = WithoutBeyond(rest, a, inward);
+      }
+    }
+    std::reverse(rest.begin(), rest.end());  // holes go clockwise
+    return rest;
   }
 
   /// Whether no material stands in a hole.
@@ -195,19 +264,28 @@ class Stacker {
       : slabs_(slabs), with_ends_(with_ends), solid_(solid), options_(options), most_(most) {}
 
   std::optional<std::vector<ConvexPiece>> Run() {
-    const double slack_m = 0.5 * std::min(options_.tolerance_near_m, options_.tolerance_far_m);
+    const double tolerance_m = std::min(options_.tolerance_near_m, options_.tolerance_far_m);
+    const double slack_m = 2 * kSimplifiedShare * tolerance_m;
     for (std::size_t first = 0; first < slabs_.size();) {
       Envelope envelope(slack_m, with_ends_);
       std::size_t last = first;
       while (last < slabs_.size() && envelope.Add(slabs_[last])) ++last;
-      if (last == first) {
-        ++first;
-        continue;
+      const bool is_alone = last == first;  // its own ends do not lie in each other
+      if (is_alone) {
+        envelope = Envelope(slack_m, false);
+        envelope.Add(slabs_[first]);
+        ++last;
+      }
+      // Middles alone do not tell what lies between them.
+      if (is_alone || !with_ends_) {
+        envelope.Cover(PointsBetween(slabs_[first].low_m, slabs_[last - 1].high_m), [&](const Eigen::Vector3d& p) {
+          return options_.mating.contains(p) ? options_.tolerance_near_m : options_.tolerance_far_m;
+        });
       }
       for (const SlabLoop& polygon :
-           ConvexPartition(envelope.loops(), slack_m, false).value_or(std::vector<SlabLoop>{})) {
-        Cell cell;
-        for (const SlabPoint& p : polygon) cell.push_back(p.middle);
+           ConvexPartition(envelope.loops(), 0.5 * tolerance_m, false).value_or(std::vector<SlabLoop>{})) {
+        Cell cell;  // convex: corners that stand in by little would each cut off much
+        for (const SlabPoint& p : HullAround(polygon, polygon)) cell.push_back(p.middle);
         Stack(cell, first, last - 1, kHalvings);
         if (pieces_.size() > most_ || (is_rough_ && !options_.rough)) return std::nullopt;
       }
@@ -217,6 +295,21 @@ class Stacker {
   }
 
  private:
+  /// The corners of the solid between two heights, and those of its sections there.
+  std::vector<Eigen::Vector3d> PointsBetween(double low_m, double high_m) const {
+    std::vector<Eigen::Vector3d> points;
+    for (const Eigen::Vector3d& p : solid_.mesh().points) {
+      if (p.z() >= low_m && p.z() <= high_m) points.push_back(p);
+    }
+    const double inward_m = std::min(1e-7, 0.25 * (high_m - low_m));  // off the faces that lie at the heights
+    for (const double height : {low_m + inward_m, high_m - inward_m}) {
+      for (const SlabLoop& loop : SectionAt(solid_.mesh(), height)) {
+        for (const SlabPoint& p : loop) points.emplace_back(p.middle.x(), p.middle.y(), height);
+      }
+    }
+    return points;
+  }
+
   /// Hulls of as many slabs as may be, from the lowest up.
   void Stack(const Cell& cell, std::size_t first, std::size_t last, int halvings) {
     while (first <= last && pieces_.size() <= most_ && (!is_rough_ || options_.rough)) {

@@ -10,6 +10,10 @@
 
 namespace feeler::cad {
 
+/// Of the tolerances, within which slabs for ColumnsOf are simplified: lines of two slabs then lie in each other within
+/// two shares of it, and the solid's own within the third.
+inline constexpr double kSimplifiedShare = 1.0 / 3;
+
 /// A solid as convex bodies that stand on each other in columns: the slabs of a stretch whose cross-sections lie in
 /// each other (a rounded rim, a dome, a bore that a slanting face cuts) share one partition, of the narrowest holes in
 /// the widest outline; over each of its polygons as many slabs as the tolerances allow become one hull. A hull holds

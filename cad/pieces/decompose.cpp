@@ -80,9 +80,9 @@ bool SameSection(const Slab& a, const Slab& b, double tolerance_m) {
   });
 }
 
-/// The slabs of a solid, simplified within half of the tolerances; prisms of one cross-section that follow each other
-/// are one.
-std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& options) {
+/// The slabs of a solid, simplified within a share of the tolerances; prisms of one cross-section that follow each
+/// other are one.
+std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& options, double share) {
   const std::vector<double> levels = SlabLevels(solid, options.most_slabs);
   std::vector<Slab> slabs;
   for (std::size_t i = 0; i + 1 < levels.size(); ++i) {
@@ -91,7 +91,7 @@ std::vector<Slab> SlabsOf(const TriangleMesh& solid, const DecomposeOptions& opt
     std::vector<SlabLoop> loops;
     for (const SlabLoop& loop : slab.loops) {
       SlabLoop simple = Simplified(loop, [&](const SlabPoint& p) {
-        return 0.5 * ToleranceAt(options, {p.middle.x(), p.middle.y(), height});
+        return share * ToleranceAt(options, {p.middle.x(), p.middle.y(), height});
       });
       if (simple.size() >= 3 && std::abs(SignedArea(simple)) > kSliver_m * kSliver_m)
         loops.push_back(std::move(simple));
@@ -278,14 +278,14 @@ std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid
   if (auto hull = HullOf(solid.points); hull && StaysInside(*hull, tree, options))
     return std::vector<ConvexPiece>{std::move(*hull)};
   const bool free_form = static_cast<int>(LevelsOf(solid, kLevel_m).size()) > options.most_slabs + 1;
-  const std::vector<Slab> slabs = SlabsOf(solid, options);
   constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
   if (!free_form || most_pieces == kAny) {
-    if (auto bodies = Elementary(slabs, options, most_bodies)) {
+    if (auto bodies = Elementary(SlabsOf(solid, options, 0.5), options, most_bodies)) {
       std::vector<ConvexPiece> pieces = Merger(std::move(*bodies), tree, options).Run();
       if (pieces.size() <= most_pieces) return pieces;
     }
   }
+  const std::vector<Slab> slabs = SlabsOf(solid, options, kSimplifiedShare);
   auto columns = ColumnsOf(slabs, !free_form, tree, options, std::min(most_bodies, 2 * most_pieces));
   if (!columns) return std::nullopt;
   std::vector<ConvexPiece> pieces = Merger(std::move(*columns), tree, options).Run();

@@ -322,25 +322,43 @@ TEST_F(CadParts, PartsThatLieAnyhowGoTogether) {
   }
 }
 
+// Of any size and fineness: a free form is drawn together to fewer slices, and lines of slices are simplified, each by
+// itself; neither may lose what stands out between slices, or take a bore for closed where its rim slants.
 TEST_F(CadParts, AHoleThatLeansAgainstItsBlockIsFoundAndCut) {
-  const PartFiles files = WriteParts("oblique-bore", folder_, "step");
-  const TriangleMesh tool = Read(files.tool).mesh;
-  const CheckedPart target = Read(files.target);
-  const Alignment alignment = FindAlignment(tool, target.mesh);
-  const Mating mating =
-      MeasureMating(tool, target.mesh, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
-  EXPECT_NEAR(1000 * mating.clearance_m.minCoeff(), 0.1, 0.01);
-  DecomposeOptions options;
-  options.mating = mating.mating_box;
-  options.tolerance_near_m = 5e-6;
-  options.tolerance_far_m = 5e-5;
-  options.rough = false;
-  const TriangleMesh solid = Transformed(target.solids.front(), mating.frame_T_target);
-  const auto pieces = DecomposeIfFew(solid, options, 4096, 512);
-  ASSERT_TRUE(pieces.has_value());
-  const MeshTree tree(solid);
-  EXPECT_LE(SampledDeviation(tree, *pieces, 40000, 5).lost_m, options.tolerance_near_m + 1e-6);  // at its tips, too
-  EXPECT_LE(SampledDeviation(tree, *pieces, 40000, 5, mating.mating_box).added_m, options.tolerance_near_m + 1e-6);
+  struct Drawn {
+    const char* format;
+    double scale, facet_mm, facet_rad;
+  };
+  for (const Drawn& drawn : {Drawn{"step", 1.0, 0.002, 0.1},
+                             {"stl", 0.543, 0.0034, 0.104},
+                             {"3mf", 0.848, 0.0044, 0.18},
+                             {"step", 1.509, 0.0093, 0.246}}) {
+    PartPlacement placement;
+    placement.scale = drawn.scale;
+    placement.facet_mm = drawn.facet_mm;
+    placement.facet_rad = drawn.facet_rad;
+    const PartFiles files = WriteParts("oblique-bore", folder_, drawn.format, placement);
+    const TriangleMesh tool = Read(files.tool).mesh;
+    const CheckedPart target = Read(files.target);
+    const Alignment alignment = FindAlignment(tool, target.mesh);
+    const Mating mating =
+        MeasureMating(tool, target.mesh, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
+    EXPECT_NEAR(1000 * mating.clearance_m.minCoeff(), 0.1 * drawn.scale, 0.01 + 2 * drawn.facet_mm);
+    DecomposeOptions options;
+    options.mating = mating.mating_box;
+    options.tolerance_near_m = 7e-6 * drawn.scale;
+    options.tolerance_far_m = 5e-5;
+    options.rough = false;
+    const TriangleMesh solid = Transformed(target.solids.front(), mating.frame_T_target);
+    const auto pieces = DecomposeIfFew(solid, options, 4096, 512);
+    ASSERT_TRUE(pieces.has_value()) << drawn.scale;
+    const MeshTree tree(solid);
+    const Deviation anywhere = SampledDeviation(tree, *pieces, 40000, 5);
+    const Deviation near = SampledDeviation(tree, *pieces, 40000, 5, mating.mating_box);
+    EXPECT_LE(anywhere.lost_m, options.tolerance_far_m + 1e-6) << drawn.scale;  // at its tips, too
+    EXPECT_LE(near.lost_m, options.tolerance_near_m + 1e-6) << drawn.scale;
+    EXPECT_LE(near.added_m, options.tolerance_near_m + 1e-6) << drawn.scale;
+  }
 }
 
 TEST_F(CadParts, AnAssembledToolIsTakenToItsStopAndMayNotLean) {
