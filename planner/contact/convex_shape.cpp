@@ -3,12 +3,19 @@
 #include <cmath>
 
 namespace feeler::planner {
+namespace {
+
+/// From so many corners on a tree is faster than a walk over all.
+constexpr std::size_t kMany = 48;
+
+}  // namespace
 
 ConvexShape::ConvexShape(const ConvexPiece& piece)
     : kind_(piece.kind), size_m_(piece.size_m), pose_(piece.frame_T_piece) {
   if (kind_ == ShapeKind::kPolytope) {
     hull_m_.reserve(piece.vertices_m.size());
     for (const Eigen::Vector3d& vertex : piece.vertices_m) hull_m_.emplace_back(pose_ * vertex);
+    if (hull_m_.size() >= kMany) tree_ = SupportTree(hull_m_);
   }
   if (kind_ == ShapeKind::kBox) {
     const Eigen::Matrix3d magnitude = pose_.linear().cwiseAbs();
@@ -37,6 +44,7 @@ Eigen::Vector3d ConvexShape::LocalSupport(const Eigen::Vector3d& d) const {
 
 Eigen::Vector3d ConvexShape::Support(const Eigen::Vector3d& direction) const {
   if (kind_ != ShapeKind::kPolytope) return pose_ * LocalSupport(pose_.linear().transpose() * direction);
+  if (!tree_.empty()) return tree_.Farthest(direction);
   const Eigen::Vector3d* best = &hull_m_.front();
   double farthest = direction.dot(*best);
   for (const Eigen::Vector3d& vertex : hull_m_) {

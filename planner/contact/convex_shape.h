@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "feeler/core/pose.h"
+#include "feeler/planner/contact/support_tree.h"
 
 namespace feeler::planner {
 
@@ -40,6 +41,7 @@ class ConvexShape {
   Eigen::Vector3d size_m_;
   Pose pose_;
   std::vector<Eigen::Vector3d> hull_m_;  ///< of a polytope, in the frame
+  SupportTree tree_;                     ///< over them, where they are many
   bool is_aligned_box_ = false;
 };
 
