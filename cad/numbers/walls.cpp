@@ -13,10 +13,12 @@ namespace {
 constexpr double kSpacing_m = 1e-3;
 constexpr int kMostLines = 110;  // along one side
 constexpr double kAccuracy_m = 1e-7;
+/// Fewer lines than that end at a corner, not at a side.
+constexpr int kFewestLines = 4;
 
 }  // namespace
 
-Walls WallsOf(const env::TaskModel& model) {
+MetWalls WallsOf(const env::TaskModel& model) {
   const env::ObstacleSet set(model, env::GeomsOf(model, env::Opening::kClosed), Eigen::Quaterniond::Identity());
   env::LineSweep sweep(set, kAccuracy_m);
   const Task& task = model.task;
@@ -27,7 +29,7 @@ Walls WallsOf(const env::TaskModel& model) {
     spacing[k] = std::max(kSpacing_m, 2 * task.workspace_m[k] / kMostLines);
     lines[k] = static_cast<int>(std::floor(2 * task.workspace_m[k] / spacing[k])) + 1;
   }
-  Walls walls;
+  MetWalls met;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3;
     const int v = (axis + 2) % 3;
@@ -49,9 +51,12 @@ Walls WallsOf(const env::TaskModel& model) {
     }
     env::WallCensus census(lines[v]);
     census.Add(ends);
-    for (const double wall : census.Walls()) walls[static_cast<std::size_t>(axis)].push_back(wall / 1000);
+    const auto number = static_cast<std::size_t>(axis);
+    for (const double wall : census.Walls()) met.walls[number].push_back(wall / 1000);
+    const auto ended = std::count_if(ends.begin(), ends.end(), [](const env::LineEnds& line) { return !line.empty(); });
+    met.any_side[number] = ended >= kFewestLines;
   }
-  return walls;
+  return met;
 }
 
 Eigen::Vector2d PlayOfPieces(const env::TaskModel& model, double depth_m, double most_m) {

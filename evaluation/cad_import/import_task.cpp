@@ -5,6 +5,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <system_error>
@@ -274,10 +275,9 @@ void RequireClearanceKept(const ImportOptions& options, ImportedTask& task, cons
 }
 
 /// Sides across x and y that can be felt from outside of the opening.
-void FindFlush(ImportedTask& task) {
-  const auto felt = [&](int axis) { return !task.walls[static_cast<std::size_t>(axis)].empty(); };
-  task.flush_x = !felt(0);
-  task.flush_y = !felt(1);
+void FindFlush(const std::array<bool, 3>& any_side, ImportedTask& task) {
+  task.flush_x = !any_side[0];
+  task.flush_y = !any_side[1];
   if (!task.flush_x && !task.flush_y) return;
   const char* axes = task.flush_x && task.flush_y ? "x and y" : task.flush_x ? "x" : "y";
   task.notes.push_back(
@@ -378,12 +378,13 @@ ImportedTask ImportTask(const ImportOptions& given) {
   task.task_file = options.out / "task.xml";
   MarkFolder(options.out);
   cad::WriteTaskFolder(content, options.out);
-  task.walls = cad::WallsOf(env::LoadTask(task.task_file.string()));
+  const cad::MetWalls met = cad::WallsOf(env::LoadTask(task.task_file.string()));
+  task.walls = met.walls;
   content.numbers = cad::DeriveNumbers(task.mating, task.tool.placed, task.target.placed, task.walls, numbers);
   cad::WriteTaskFolder(content, options.out);
   const env::TaskModel model = env::LoadTask(task.task_file.string());
   RequireClearanceKept(options, task, model);
-  FindFlush(task);
+  FindFlush(met.any_side, task);
   Describe(options, alignment, task);
   task.json = ImportJson(options, task);
   WriteFileAtomically((options.out / "import.json").string(), task.json.dump(2) + "\n");
