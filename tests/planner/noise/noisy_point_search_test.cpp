@@ -11,6 +11,7 @@
 #include "feeler/planner/belief/lattice_problem.h"
 #include "feeler/planner/noise/noisy_policy.h"
 #include "feeler/planner/noise/solve_noisy.h"
+#include "tests/planner/noise/lattices.h"
 #include "tests/planner/noise/slot.h"
 
 namespace feeler::planner {
@@ -20,29 +21,6 @@ namespace {
 LatticeProblemData WeightedSlot() {
   LatticeProblemData data = Slot();
   for (Hypothesis& hypothesis : data.hypotheses) hypothesis.weight = 1.0 + hypothesis.offset.x();
-  return data;
-}
-
-/// A block with a hole of two cells' depth, off its middle.
-LatticeProblemData Pocket() {
-  LatticeProblemData data;
-  data.name = "pocket";
-  data.size = Cell(11, 11, 9);
-  data.start = Cell(1, 1, 8);
-  data.tool = {Cell::Zero()};
-  for (int x = 2; x <= 6; ++x) {
-    for (int y = 2; y <= 6; ++y) {
-      for (int z = 0; z <= 2; ++z) {
-        if (x != 4 || y != 4 || z == 0) data.target.emplace_back(x, y, z);
-      }
-    }
-  }
-  for (int x = 0; x < 3; ++x) {
-    for (int y = 0; y < 3; ++y) {
-      for (int z = 0; z < 3; ++z) data.hypotheses.push_back({Cell(x, y, z), 0, 1.0});
-    }
-  }
-  data.move_lengths = {1, 2, 4, 8, 16};
   return data;
 }
 
