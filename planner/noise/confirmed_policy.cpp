@@ -74,7 +74,7 @@ void ConfirmedPolicy::Run(const Stop& stop) {
     if (move_.size() < graph_.size()) move_.resize(graph_.size(), kEnd);
     move_[b] = move;
   }
-  Settle();
+  Settle(stop);
 }
 
 std::size_t ConfirmedPolicy::bytes() const {
@@ -83,7 +83,7 @@ std::size_t ConfirmedPolicy::bytes() const {
 }
 
 /// From above: each value is the cost of a policy at all times, ending where that is cheaper.
-void ConfirmedPolicy::Settle() {
+void ConfirmedPolicy::Settle(const Stop& stop) {
   constexpr int kSweeps = 1000;
   constexpr double kSettled = 1e-12;
   move_.resize(std::max(move_.size(), graph_.size()), kEnd);
@@ -104,7 +104,7 @@ void ConfirmedPolicy::Settle() {
       change = std::max(change, value - cost / leaves);
       value = cost / leaves;
     }
-    if (change <= kSettled * graph_.noisy().WrongCost()) break;
+    if (change <= kSettled * graph_.noisy().WrongCost() || stop(expansions())) break;
   }
   for (const Step& step : order_) {
     if (value_[step.belief] >= graph_.EndCost(step.belief)) move_[step.belief] = kEnd;

@@ -43,7 +43,7 @@ class ConfirmedPolicy {
     double cost = 0.0;
     std::size_t first = 0, count = 0;  ///< of branches_
   };
-  void Settle();
+  void Settle(const Stop& stop);
 
   NoisyBeliefGraph& graph_;
   BeliefGraph sure_;

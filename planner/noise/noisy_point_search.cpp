@@ -298,12 +298,13 @@ bool NoisyPointSearch::Trial(double gap) {
   while (trial.size() < kLongestTrial && Upper(b) - Lower(b) > (b == start ? 0.0 : width)) {
     const std::size_t action = Update(b);
     trial.push_back(b);
+    if (late_ && late_()) return changes_ > changes;
     const std::uint32_t next = WidestSuccessor(b, action, width);
     if (next == b) break;
     const std::uint32_t core = graph_.Core(next, kTiny);
     b = Upper(core) - Lower(core) > width ? core : next;
   }
-  for (; !trial.empty(); trial.pop_back()) {
+  for (; !trial.empty() && !(late_ && late_()); trial.pop_back()) {
     Update(trial.back());
     Prune(At(graph_.Robot(trial.back())));
   }

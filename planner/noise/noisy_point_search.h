@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -27,13 +28,16 @@ class NoisyPointSearch {
   /// Everything must outlive the search.
   NoisyPointSearch(NoisyBeliefGraph& graph, NoisyBound& bound);
 
+  /// Trials are long: `late`, asked after each update, ends one early.
+  void SetClock(std::function<bool()> late) { late_ = std::move(late); }
+
   /// Trials until U <= gap L at the start (nothing), or `stop(expansions)` says why not to go on. May be called again.
   /// `rounding`: trials change nothing any more.
   template <class Stop>
   std::optional<SolverStatus> Run(double gap, Stop stop) {
     while (Upper(graph_.Start()) > gap * Lower(graph_.Start()) + kNothing) {
       if (const auto why = stop(expansions_)) return why;
-      if (!Trial(gap)) return SolverStatus::kRounding;
+      if (!Trial(gap)) return late_ && late_() ? SolverStatus::kTimeLimit : SolverStatus::kRounding;
     }
     return std::nullopt;
   }
@@ -110,6 +114,7 @@ class NoisyPointSearch {
   std::vector<WeightedHypothesis> rest_;
   std::vector<double> q_lower_;
   std::vector<std::uint8_t> fresh_;
+  std::function<bool()> late_;  ///< may be empty
   std::int64_t changes_ = 0;
   std::int64_t trials_ = 0, expansions_ = 0;
   std::size_t bytes_ = 0;

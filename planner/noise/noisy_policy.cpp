@@ -1,19 +1,21 @@
 #include "feeler/planner/noise/noisy_policy.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <queue>
 #include <tuple>
 #include <utility>
 
+#include "feeler/planner/noise/markov_chain.h"
+
 namespace feeler::planner {
 namespace {
 
-/// Sweeps stop where none changes more than this, relative to the cost of being wrong.
-constexpr double kSettled = 1e-13;
-constexpr int kMostSweeps = 100000;
+/// Nodes that a replay reaches more rarely count as given up: all of them together, some 1e-8 of that cost.
+constexpr double kLeastReplayed = 1e-13;
+constexpr std::uint32_t kNotMet = std::numeric_limits<std::uint32_t>::max();
 
 struct Place {
   std::uint32_t belief = 0;
@@ -22,7 +24,7 @@ struct Place {
 
 /// The graph of beliefs that a policy meets, most probable first, as nodes; costs of their moves beside them.
 void Collect(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of, double least_reach,
-             NoisyPolicy& policy, std::vector<Place>& places) {
+             const std::function<bool()>& late, NoisyPolicy& policy, std::vector<Place>& places) {
   std::map<std::uint32_t, std::uint32_t> number = {{graph.Start(), 0}};
   std::vector<double> reach = {1.0};
   std::vector<std::uint8_t> done = {0};
@@ -36,7 +38,8 @@ void Collect(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint3
     if (done[n] != 0) continue;
     done[n] = 1;
     const std::uint32_t b = places[n].belief;
-    const GuardedMove move = mass < least_reach ? GuardedMove{Direction::kPlusX, 0} : move_of(b);
+    const bool ends = mass < least_reach || (late && late());
+    const GuardedMove move = ends ? GuardedMove{Direction::kPlusX, 0} : move_of(b);
     policy.nodes[n].move = move;
     if (move.cells == 0) {
       const int set = graph.Declared(b);
@@ -61,58 +64,126 @@ void Collect(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint3
   }
 }
 
-/// Solves x(n) = at(n) + sum p x(next), with x(n) = at(n) at ends, from the values given (Gauss-Seidel, ends first). A
-/// move that leads back to its node is repeated `repeats(n)` times, then paid for with `given_up`; for ever where there
-/// are none.
-void Settle(const NoisyPolicy& policy, const std::vector<double>& at, double scale, const std::vector<int>& repeats,
-            double given_up, std::vector<double>& x) {
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    double change = 0.0;
-    for (std::size_t n = policy.nodes.size(); n-- > 0;) {
-      double sum = at[n];
-      double stays = 0.0;
-      for (const NoisyPolicy::Branch& branch : policy.nodes[n].branches) {
-        if (branch.next == n) {
-          stays += branch.probability;
-        } else {
-          sum += branch.probability * x[branch.next];
-        }
-      }
-      if (repeats.empty()) {
-        sum /= 1.0 - stays;
-      } else {
-        double times = 0.0;
-        double again = 1.0;
-        for (int k = 0; k <= repeats[n]; ++k, again *= stays) times += again;
-        sum = sum * times + again * given_up;
-      }
-      change = std::max(change, std::abs(sum - x[n]));
-      x[n] = sum;
-    }
-    if (change <= kSettled * scale) return;
+MarkovChain ChainOf(const NoisyPolicy& policy) {
+  MarkovChain chain;
+  for (const NoisyPolicy::Node& node : policy.nodes) {
+    chain.AddState();
+    for (const NoisyPolicy::Branch& branch : node.branches) chain.AddStep(branch.next, branch.probability);
   }
+  return chain;
 }
+
+/// A policy under one hypothesis: a Markov chain over its nodes (each knows the robot's cell, being one belief), the
+/// most probable ones first. A move that leads back to its node is repeated so often as `repeats` says, then given up;
+/// so are nodes that are reached with less than kLeastReplayed.
+class Replay {
+ public:
+  Replay(const NoisyProblem& noisy, const NoisyPolicy& policy, const std::vector<int>& repeats)
+      : noisy_(noisy), policy_(policy), repeats_(repeats), moves_(noisy.noise) {}
+
+  double CostUnder(std::size_t h) {
+    places_.assign(policy_.nodes.size(), {});
+    places_[policy_.root] = {1.0, kNotMet, noisy_.problem.start};
+    costs_.clear();
+    first_.clear();
+    steps_.clear();
+    queue_.emplace(1.0, policy_.root);
+    while (!queue_.empty()) {
+      const std::uint32_t n = queue_.top().second;
+      queue_.pop();
+      if (places_[n].state != kNotMet || places_[n].reach < kLeastReplayed) continue;
+      places_[n].state = static_cast<std::uint32_t>(costs_.size());
+      Follow(n, h);
+    }
+    MarkovChain chain;
+    const auto given_up = static_cast<std::uint32_t>(costs_.size());
+    for (std::size_t i = 0; i < costs_.size(); ++i) {
+      chain.AddState();
+      const std::size_t end = i + 1 < costs_.size() ? first_[i + 1] : steps_.size();
+      for (std::size_t s = first_[i]; s < end; ++s) {
+        chain.AddStep(std::min(places_[steps_[s].first].state, given_up), steps_[s].second);
+      }
+    }
+    chain.AddState();
+    costs_.push_back(noisy_.WrongCost());
+    return chain.ExpectedSums(costs_, noisy_.WrongCost())[0];
+  }
+
+ private:
+  struct Place {
+    double reach = 0.0;
+    std::uint32_t state = kNotMet;  ///< of the chain
+    Cell robot = Cell::Zero();
+  };
+
+  void Follow(std::uint32_t n, std::size_t h) {
+    const NoisyPolicy::Node& node = policy_.nodes[n];
+    const std::size_t first = steps_.size();
+    first_.push_back(first);
+    if (node.ends()) {
+      const bool right = std::ranges::count(node.declared, static_cast<int>(h)) > 0;
+      costs_.push_back(right ? 0.0 : noisy_.WrongCost());
+      return;
+    }
+    const Problem& problem = noisy_.problem;
+    const Place here = places_[n];
+    const NoisyMove& does =
+        moves_.Of(node.move.cells, Simulate(problem, here.robot, node.move, problem.hypotheses[h]).cells);
+    double cost = does.Cost(problem.cost, node.move.direction);
+    double stays = 0.0;
+    for (const NoisyOutcome& o : does.outcomes) {
+      const auto branch = std::ranges::find(node.branches, o.outcome, &NoisyPolicy::Branch::outcome);
+      if (branch == node.branches.end()) {  // improbable beyond rounding: as given up
+        cost += o.probability * noisy_.WrongCost();
+      } else if (branch->next == n) {
+        stays += o.probability;
+      } else {
+        steps_.emplace_back(branch->next, o.probability);
+        places_[branch->next].robot = here.robot + o.outcome.cells * UnitCell(node.move.direction);
+      }
+    }
+    const double made = repeats_[n] + 1.0;
+    const double left = std::pow(stays, made);
+    const double times = stays < 1.0 ? (1.0 - left) / (1.0 - stays) : made;
+    costs_.push_back(times * cost + left * noisy_.WrongCost());
+    for (std::size_t s = first; s < steps_.size(); ++s) {
+      steps_[s].second *= times;
+      Place& there = places_[steps_[s].first];
+      there.reach += here.reach * steps_[s].second;
+      if (there.state == kNotMet) queue_.emplace(there.reach, steps_[s].first);
+    }
+  }
+
+  const NoisyProblem& noisy_;
+  const NoisyPolicy& policy_;
+  const std::vector<int>& repeats_;
+  NoisyMoves moves_;
+  std::vector<Place> places_;       ///< by node
+  std::vector<double> costs_;       ///< by state of the chain
+  std::vector<std::size_t> first_;  ///< of steps_, by state
+  std::vector<std::pair<std::uint32_t, double>> steps_;
+  std::priority_queue<std::pair<double, std::uint32_t>> queue_;
+};
 
 }  // namespace
 
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
-                              double least_reach, NoisyEvaluation* evaluation, std::vector<std::uint32_t>* beliefs) {
+                              double least_reach, NoisyEvaluation* evaluation, std::vector<std::uint32_t>* beliefs,
+                              const std::function<bool()>& late) {
   NoisyPolicy policy;
   std::vector<Place> places;
-  Collect(graph, move_of, least_reach, policy, places);
+  Collect(graph, move_of, least_reach, late, policy, places);
   const std::size_t count = policy.nodes.size();
-  const double wrong_cost = graph.noisy().WrongCost();
-  std::vector<double> at(count), cost(count, 0.0);
+  std::vector<double> at(count);
   for (std::size_t n = 0; n < count; ++n) at[n] = places[n].cost;
-  Settle(policy, at, wrong_cost, {}, 0.0, cost);
+  MarkovChain chain = ChainOf(policy);
+  const std::vector<double> cost = chain.ExpectedSums(at, 0.0);
   for (std::size_t n = 0; n < count; ++n) policy.nodes[n].expected_cost = cost[n];
   for (std::size_t n = 0; beliefs != nullptr && n < count; ++n) beliefs->push_back(places[n].belief);
   if (evaluation == nullptr) return policy;
   const auto of = [&](const std::function<double(const NoisyPolicy::Node&)>& value) {
-    std::vector<double> x(count, 0.0);
     for (std::size_t n = 0; n < count; ++n) at[n] = value(policy.nodes[n]);
-    Settle(policy, at, 1.0, {}, 0.0, x);
-    return x[policy.root];
+    return chain.ExpectedSums(at, 0.0)[policy.root];
   };
   using Node = NoisyPolicy::Node;
   evaluation->expected_cost = cost[policy.root];
@@ -130,8 +201,6 @@ int MostRepeats(double stays) {
 }
 
 std::vector<double> ReplayNoisyPolicy(const NoisyProblem& noisy, const NoisyPolicy& policy) {
-  const Problem& problem = noisy.problem;
-  NoisyMoves moves(noisy.noise);
   std::vector<int> repeats;
   for (std::uint32_t n = 0; n < policy.nodes.size(); ++n) {
     double stays = 0.0;
@@ -140,43 +209,9 @@ std::vector<double> ReplayNoisyPolicy(const NoisyProblem& noisy, const NoisyPoli
     }
     repeats.push_back(MostRepeats(stays));
   }
+  Replay replay(noisy, policy, repeats);
   std::vector<double> costs;
-  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
-    // Under one hypothesis: a Markov chain over nodes (each node knows the robot's cell, being one belief).
-    std::vector<Cell> robot(policy.nodes.size(), problem.start);
-    std::vector<std::uint8_t> met(policy.nodes.size(), 0);
-    std::vector<std::uint32_t> order = {policy.root};
-    std::vector<double> at(policy.nodes.size(), 0.0);
-    NoisyPolicy chain;
-    chain.nodes.resize(policy.nodes.size());
-    met[policy.root] = 1;
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const std::uint32_t n = order[i];
-      const NoisyPolicy::Node& node = policy.nodes[n];
-      if (node.ends()) {
-        at[n] = std::ranges::count(node.declared, static_cast<int>(h)) > 0 ? 0.0 : noisy.WrongCost();
-        continue;
-      }
-      const int room = Simulate(problem, robot[n], node.move, problem.hypotheses[h]).cells;
-      const NoisyMove& does = moves.Of(node.move.cells, room);
-      at[n] = does.Cost(problem.cost, node.move.direction);
-      for (const NoisyOutcome& o : does.outcomes) {
-        const auto branch = std::ranges::find(node.branches, o.outcome, &NoisyPolicy::Branch::outcome);
-        if (branch == node.branches.end()) {  // improbable beyond rounding: as given up
-          at[n] += o.probability * noisy.WrongCost();
-          continue;
-        }
-        chain.nodes[n].branches.push_back({o.outcome, branch->next, o.probability});
-        if (met[branch->next] != 0) continue;
-        met[branch->next] = 1;
-        robot[branch->next] = robot[n] + o.outcome.cells * UnitCell(node.move.direction);
-        order.push_back(branch->next);
-      }
-    }
-    std::vector<double> x(policy.nodes.size(), 0.0);
-    Settle(chain, at, noisy.WrongCost(), repeats, noisy.WrongCost(), x);
-    costs.push_back(x[policy.root]);
-  }
+  for (std::size_t h = 0; h < noisy.problem.hypotheses.size(); ++h) costs.push_back(replay.CostUnder(h));
   return costs;
 }
 

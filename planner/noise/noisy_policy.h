@@ -39,10 +39,11 @@ struct NoisyEvaluation {
 };
 
 /// The policy that makes the move `move_of(b)` at every belief it reaches from the start (cells = 0: ends). Beliefs
-/// reached with less than `least_reach` end. `beliefs` (may be null): of each node.
+/// reached with less than `least_reach` end, and all that are left, the least probable ones, once `late` (may be empty)
+/// says so. `beliefs` (may be null): of each node.
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
                               double least_reach, NoisyEvaluation* evaluation,
-                              std::vector<std::uint32_t>* beliefs = nullptr);
+                              std::vector<std::uint32_t>* beliefs = nullptr, const std::function<bool()>& late = {});
 
 /// How often a move whose outcome leaves a belief as it is with probability `stays` is made again before that counts as
 /// giving up: so often that it happens with less than 1e-18.
@@ -50,7 +51,8 @@ int MostRepeats(double stays);
 
 /// The exact cost of a policy under each hypothesis, in problem order, replayed step by step against the contact map
 /// and independent of beliefs: moves, a wrong declaration and giving up paid by `noisy`. Outcomes that have no branch
-/// (too improbable for one) and moves repeated more than MostRepeats count as giving up.
+/// (too improbable for one), moves repeated more than MostRepeats, what goes round without a way out and what is
+/// reached with less than 1e-13 count as giving up, which only adds to the cost.
 std::vector<double> ReplayNoisyPolicy(const NoisyProblem& noisy, const NoisyPolicy& policy);
 
 }  // namespace feeler::planner
