@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/perception/nearest_points.h"
 
 namespace feeler::perception {
@@ -21,11 +22,7 @@ using CubeKey = std::array<std::int64_t, 3>;
 std::vector<int> GroupsOf(const Points& points, double link_m, int& groups) {
   std::map<CubeKey, std::vector<std::size_t>> cubes;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    CubeKey key;
-    for (int axis = 0; axis < 3; ++axis) {
-      key[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(points[i][axis] / link_m));
-    }
-    cubes[key].push_back(i);
+    cubes[CubeOf(points[i], link_m)].push_back(i);
   }
   std::map<CubeKey, int> group_of;
   groups = 0;

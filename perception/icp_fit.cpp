@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
+
 namespace feeler::perception {
 namespace {
 
@@ -138,8 +140,7 @@ std::vector<std::size_t> Visible(const TargetModel::Level& model, const Eigen::V
     const double distance = ray.norm();
     if (-ray.dot(surface.normals[i]) < kGrazing * distance) continue;
     const double depth = ray.dot(ahead);
-    seen.push_back({static_cast<std::int64_t>(std::floor(ray.dot(right) / depth / cell)),
-                    static_cast<std::int64_t>(std::floor(ray.dot(down) / depth / cell)), distance, i});
+    seen.push_back({StretchOf(ray.dot(right) / depth / cell), StretchOf(ray.dot(down) / depth / cell), distance, i});
   }
   std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) {
     return std::tie(a.u, a.v, a.distance_m, a.index) < std::tie(b.u, b.v, b.distance_m, b.index);

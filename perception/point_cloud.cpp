@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
+
 namespace feeler::perception {
 namespace {
 
@@ -17,11 +19,7 @@ std::vector<std::pair<Key, std::size_t>> ByCube(const Points& points, double cel
   std::vector<std::pair<Key, std::size_t>> order;
   order.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    Key key;
-    for (int axis = 0; axis < 3; ++axis) {
-      key[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(points[i][axis] / cell_m));
-    }
-    order.emplace_back(key, i);
+    order.emplace_back(CubeOf(points[i], cell_m), i);
   }
   const auto before = [&](const auto& a, const auto& b) {
     if (a.first != b.first) return a.first < b.first;

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "feeler/core/lattice_grid.h"
+
 namespace feeler::cad {
 namespace {
 
@@ -16,12 +18,8 @@ class PointGrid {
 
   /// The number of a point within the tolerance of `p`; a new one where there is none.
   int NumberOf(const Eigen::Vector3d& p, std::vector<Eigen::Vector3d>& points) {
-    std::array<std::int64_t, 3> low{};
-    std::array<std::int64_t, 3> high{};
-    for (int k = 0; k < 3; ++k) {
-      low[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor((p[k] - tolerance_m_) / cell_m_));
-      high[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor((p[k] + tolerance_m_) / cell_m_));
-    }
+    const auto low = CubeOf(p - Eigen::Vector3d::Constant(tolerance_m_), cell_m_);
+    const auto high = CubeOf(p + Eigen::Vector3d::Constant(tolerance_m_), cell_m_);
     for (std::int64_t x = low[0]; x <= high[0]; ++x) {
       for (std::int64_t y = low[1]; y <= high[1]; ++y) {
         for (std::int64_t z = low[2]; z <= high[2]; ++z) {
@@ -35,8 +33,8 @@ class PointGrid {
     }
     const int number = static_cast<int>(points.size());
     points.push_back(p);
-    const auto cell = [&](int k) { return static_cast<std::int64_t>(std::floor(p[k] / cell_m_)); };
-    cells_[Key(cell(0), cell(1), cell(2))].push_back(number);
+    const auto [x, y, z] = CubeOf(p, cell_m_);
+    cells_[Key(x, y, z)].push_back(number);
     return number;
   }
 

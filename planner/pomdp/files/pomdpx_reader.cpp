@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -126,7 +127,7 @@ class Reader {
     }
     const XMLElement& count = Child(element, "NumValues");
     const double number = Number(count, Word(count));
-    if (!(number >= 1.0) || number != static_cast<double>(static_cast<long long>(number))) {
+    if (!(number >= 1.0) || number != std::floor(number)) {
       Fail(count, fmt::format("{:g} values", number), "give a whole number of at least 1");
     }
     RequireFits(fmt::format("{}:{}", model_.name, count.GetLineNum()), number, 1.0, number);

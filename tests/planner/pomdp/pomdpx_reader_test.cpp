@@ -130,6 +130,9 @@ TEST(PomdpxReader, MalformedFilesNameTheLine) {
       {Without(diagram, "<SubDAG type=\"deterministic\" var=\"rock_1\" val=\"bad\"/>"), "<Edge> holds no branch"},
       {Without(diagram, "idref=\"same\"", "idref=\"other\""), "unknown template \"other\""},
       {Without(good, "<NumValues>3</NumValues>", "<NumValues>1000000000</NumValues>"), "file:5: 1e+09 states"},
+      {Without(good, "<NumValues>3</NumValues>", "<NumValues>18446744073709551616</NumValues>"), "1.845e+19 states"},
+      {Without(good, "<NumValues>3</NumValues>", "<NumValues>1e300</NumValues>"), "1e+300 states"},
+      {Without(good, "<NumValues>3</NumValues>", "<NumValues>2.5</NumValues>"), "2.5 values"},
       {Without(good, kTableSensor), "no table of \"sensor\" in <ObsFunction>"},
       {Without(good, "0.95", "1.0"), "file:3: a discount of 1"},
       // What the format does not know, or knows once.
