@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "feeler/env/model/geom_shapes.h"
@@ -21,20 +22,27 @@ constexpr double kHiddenDepth_m = 1e-4;
 ObstacleSet::ObstacleSet(const TaskModel& model, FeltGeoms felt, const Eigen::Quaterniond& target_orientation)
     : task_model(&model), geoms(std::move(felt)), orientation(target_orientation) {
   const Pose rotation = MakePose(Eigen::Vector3d::Zero(), orientation);
+  std::vector<Pose> poses;
+  std::vector<std::optional<planner::ConvexShape>> targets;  // nothing for a plane
+  for (const int geom : geoms.target) {
+    poses.push_back(rotation * GeomInBody(*model.model, geom, model.target_body));
+    targets.emplace_back();
+    if (model.model->geom_type[geom] == mjGEOM_PLANE) continue;
+    targets.back().emplace(PieceOf(*model.model, geom, poses.back()));
+    targets.back()->PrepareForMany();
+  }
   for (const int tool_geom : geoms.tool) {
-    const planner::ConvexShape tool(
-        PieceOf(*model.model, tool_geom, GeomInBody(*model.model, tool_geom, model.tool_body)));
-    for (const int target_geom : geoms.target) {
-      const Pose pose = rotation * GeomInBody(*model.model, target_geom, model.target_body);
-      if (model.model->geom_type[target_geom] == mjGEOM_PLANE) {
-        const Eigen::Vector3d normal = pose.linear().col(2);
-        half_spaces.push_back(
-            {tool_geom, target_geom, normal, normal.dot(pose.translation()) - normal.dot(tool.Support(-normal))});
-      } else {
-        obstacles.push_back(
-            {tool_geom, target_geom,
-             planner::ConvexObstacle(tool, planner::ConvexShape(PieceOf(*model.model, target_geom, pose)))});
+    planner::ConvexShape tool(PieceOf(*model.model, tool_geom, GeomInBody(*model.model, tool_geom, model.tool_body)));
+    tool.PrepareForMany();
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+      const int target_geom = geoms.target[i];
+      if (targets[i]) {
+        obstacles.push_back({tool_geom, target_geom, planner::ConvexObstacle(tool, *targets[i])});
+        continue;
       }
+      const Eigen::Vector3d normal = poses[i].linear().col(2);
+      half_spaces.push_back(
+          {tool_geom, target_geom, normal, normal.dot(poses[i].translation()) - normal.dot(tool.Support(-normal))});
     }
   }
 }

@@ -5,8 +5,8 @@
 namespace feeler::planner {
 namespace {
 
-/// From so many corners on a tree is faster than a walk over all.
-constexpr std::size_t kMany = 48;
+/// From so many corners on a table is faster than a walk over all.
+constexpr std::size_t kMany = 24;
 
 }  // namespace
 
@@ -15,12 +15,15 @@ ConvexShape::ConvexShape(const ConvexPiece& piece)
   if (kind_ == ShapeKind::kPolytope) {
     hull_m_.reserve(piece.vertices_m.size());
     for (const Eigen::Vector3d& vertex : piece.vertices_m) hull_m_.emplace_back(pose_ * vertex);
-    if (hull_m_.size() >= kMany) tree_ = SupportTree(hull_m_);
   }
   if (kind_ == ShapeKind::kBox) {
     const Eigen::Matrix3d magnitude = pose_.linear().cwiseAbs();
     is_aligned_box_ = (magnitude.rowwise().maxCoeff().array() > 1 - 1e-14).all();
   }
+}
+
+void ConvexShape::PrepareForMany() {
+  if (!table_ && hull_m_.size() >= kMany) table_ = std::make_shared<const SupportTable>(hull_m_);
 }
 
 Eigen::Vector3d ConvexShape::LocalSupport(const Eigen::Vector3d& d) const {
@@ -44,7 +47,7 @@ Eigen::Vector3d ConvexShape::LocalSupport(const Eigen::Vector3d& d) const {
 
 Eigen::Vector3d ConvexShape::Support(const Eigen::Vector3d& direction) const {
   if (kind_ != ShapeKind::kPolytope) return pose_ * LocalSupport(pose_.linear().transpose() * direction);
-  if (!tree_.empty()) return tree_.Farthest(direction);
+  if (table_) return table_->Farthest(direction);
   const Eigen::Vector3d* best = &hull_m_.front();
   double farthest = direction.dot(*best);
   for (const Eigen::Vector3d& vertex : hull_m_) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "feeler/core/pose.h"
-#include "feeler/planner/contact/support_tree.h"
+#include "feeler/planner/contact/support_table.h"
 
 namespace feeler::planner {
 
@@ -27,6 +27,8 @@ class ConvexShape {
  public:
   explicit ConvexShape(const ConvexPiece& piece);
 
+  /// Makes Support fast for a shape that will be asked very often, where it has many corners. Same answers.
+  void PrepareForMany();
   /// The point of the shape farthest along `direction` (need not be a unit vector, must not be zero).
   Eigen::Vector3d Support(const Eigen::Vector3d& direction) const;
   /// A point inside.
@@ -40,8 +42,8 @@ class ConvexShape {
   ShapeKind kind_;
   Eigen::Vector3d size_m_;
   Pose pose_;
-  std::vector<Eigen::Vector3d> hull_m_;  ///< of a polytope, in the frame
-  SupportTree tree_;                     ///< over them, where they are many
+  std::vector<Eigen::Vector3d> hull_m_;        ///< of a polytope, in the frame
+  std::shared_ptr<const SupportTable> table_;  ///< of them, once it was made; copies share it
   bool is_aligned_box_ = false;
 };
 

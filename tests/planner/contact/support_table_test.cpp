@@ -1,5 +1,5 @@
-// The tree gives, bit for bit, the point that a walk over all gives: the first of the farthest.
-#include "feeler/planner/contact/support_tree.h"
+// The table gives, bit for bit, the point that a walk over all gives: the first of the farthest.
+#include "feeler/planner/contact/support_table.h"
 
 #include <gtest/gtest.h>
 
@@ -21,19 +21,19 @@ std::size_t FirstOfFarthest(const std::vector<Eigen::Vector3d>& points, const Ei
 }
 
 void ExpectTheSame(const std::vector<Eigen::Vector3d>& points, RandomStream& random) {
-  const SupportTree tree(points);
+  const SupportTable table(points);
   for (int i = 0; i < 2000; ++i) {
     Eigen::Vector3d direction(random.Normal(), random.Normal(), random.Normal());
     if (i % 4 == 0) direction[static_cast<int>(random.Index(3))] = 0.0;
     if (i % 8 == 0) direction = Eigen::Vector3d::Unit(static_cast<int>(random.Index(3)));  // many are as far
     direction *= std::exp(random.Uniform(-20.0, 20.0));
     const Eigen::Vector3d& expected = points[FirstOfFarthest(points, direction)];
-    EXPECT_EQ(tree.Farthest(direction), expected);
+    EXPECT_EQ(table.Farthest(direction), expected);
   }
 }
 
-TEST(SupportTree, IsAWalkOverAllPoints) {
-  RandomStream random(1, 0, "support tree");
+TEST(SupportTable, IsAWalkOverAllPoints) {
+  RandomStream random(1, 0, "support table");
   for (const int count : {1, 2, 8, 9, 50, 333}) {
     std::vector<Eigen::Vector3d> points;
     for (int i = 0; i < count; ++i) points.emplace_back(random.Normal(), random.Normal(), random.Normal());
