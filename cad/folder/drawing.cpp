@@ -56,11 +56,13 @@ class Sheet {
     body_ += fmt::format("<line x1=\"{:.2f}\" y1=\"{:.2f}\" x2=\"{:.2f}\" y2=\"{:.2f}\" {}/>\n", X(a.x()), Y(a.y()),
                          X(b.x()), Y(b.y()), style);
   }
+  /// Beside a place: it ends there where `anchor` is "end", and begins there where it is "start".
   void Label(const Eigen::Vector2d& at, const std::string& text, const std::string& anchor) {
+    constexpr double kBeside_px = 8;
     body_ += fmt::format(
         "<text x=\"{:.2f}\" y=\"{:.2f}\" font-size=\"14\" font-family=\"sans-serif\" fill=\"#111\" text-anchor=\"{}\" "
         "stroke=\"#fff\" stroke-width=\"3\" paint-order=\"stroke\">{}</text>\n",
-        X(at.x()), Y(at.y()) - 5, anchor, text);
+        X(at.x()) + (anchor == "end" ? -kBeside_px : kBeside_px), Y(at.y()) - 5, anchor, text);
   }
   std::string Finish() const {
     const double height = scale_ * view_.sizes().y();
@@ -150,20 +152,20 @@ std::string SectionSvg(const Mating& mating, const TriangleMesh& tool, const Tri
   }
   const Eigen::Vector2d half(0.5 * span, 0.42 * span);
   Sheet sheet({center - half, center + half});
-  sheet.Area(target_cut, "fill=\"#7d8ea3\" stroke=\"#2d3a4c\" stroke-width=\"1\"");
+  // Below the parts: elsewhere the opening may be wider than in this plane.
   if (options.axis != 2 && !mating.openings.empty()) {
     sheet.Rectangle(opening, "fill=\"#e6501e\" fill-opacity=\"0.18\" stroke=\"#e6501e\" stroke-dasharray=\"5 3\"");
   }
+  sheet.Area(target_cut, "fill=\"#7d8ea3\" stroke=\"#2d3a4c\" stroke-width=\"1\"");
   sheet.Area(tool_cut, "fill=\"#d9a441\" stroke=\"#6b4a10\" stroke-width=\"1\"");
   if (options.axis != 2)
     sheet.Line({center.x() - half.x(), 0}, {center.x() + half.x(), 0}, "stroke=\"#555\" stroke-dasharray=\"2 4\"");
   if (gap.found) {
     const double y = options.zoom && options.axis != 2 ? center.y() - 0.25 * span : level;
     sheet.Line({gap.from, y}, {gap.to, y}, "stroke=\"#c00\" stroke-width=\"2.5\"");
-    sheet.Label({gap.to, y}, fmt::format("clearance {:.3f} mm a side", 1000 * clearance),
-                options.zoom ? "middle" : "end");
+    sheet.Label({gap.from, y}, fmt::format("clearance {:.3f} mm a side", 1000 * clearance), "end");
   }
-  if (options.axis != 2) sheet.Label({center.x() - 0.98 * half.x(), 0}, "rim", "start");
+  if (options.axis != 2) sheet.Label({center.x() - half.x(), 0}, "rim", "start");
   return sheet.Finish();
 }
 

@@ -19,9 +19,14 @@ const char* const kStyle =
     "h1{font-size:1.5em}h2{font-size:1.15em;margin-top:1.8em;border-bottom:1px solid #d5d9de}"
     "table{border-collapse:collapse}td,th{border:1px solid #d5d9de;padding:3px 9px;text-align:left;vertical-align:top}"
     "th{background:#f2f4f6}.verdict{background:#eef4ff;border-left:4px solid #3b6fd4;padding:.7em 1em}"
-    ".pictures{display:flex;flex-wrap:wrap;gap:14px}figure{margin:0;max-width:560px}img,svg{max-width:100%;height:auto;"
+    ".pictures{display:flex;flex-wrap:wrap;gap:14px;margin-top:14px}figure{margin:0;max-width:560px}img,svg{max-width:"
+    "100%;height:auto;"
     "border:1px solid #d5d9de}"
-    "figcaption{color:#555;font-size:.9em}code{background:#f2f4f6;padding:0 3px}";
+    "figcaption{color:#555;font-size:.9em}code{background:#f2f4f6;padding:0 3px}"
+    // On a phone the fields of the task file stand above what is said of them; wide tables scroll.
+    ".wide{overflow-x:auto}table+.wide{margin-top:10px}@media(max-width:640px){body{margin:1em auto}"
+    ".fields,.fields tbody,.fields tr,.fields td,.fields th{display:block}.fields td,.fields th{border-width:0 1px}"
+    ".fields tr{border-bottom:1px solid #d5d9de}.fields .head{display:none}}";
 
 std::string Html(const std::string& text) {
   std::string html;
@@ -97,7 +102,7 @@ std::string Pictures(const ImportedTask& task) {
 }
 
 std::string PartTable(const ImportedTask& task) {
-  std::string html = "<table><tr><th></th><th>tool</th><th>target</th></tr>\n";
+  std::string html = "<div class=\"wide\"><table><tr><th></th><th>tool</th><th>target</th></tr>\n";
   const auto row = [&](const std::string& name, const std::function<std::string(const ImportedPart&)>& value) {
     html += fmt::format("<tr><th>{}</th><td>{}</td><td>{}</td></tr>\n", Html(name), Html(value(task.tool)),
                         Html(value(task.target)));
@@ -129,7 +134,7 @@ std::string PartTable(const ImportedTask& task) {
   row("the same from 100,000 sampled points", [](const ImportedPart& p) {
     return fmt::format("{} added, {} lost", Millimetres(p.sampled.added_m), Millimetres(p.sampled.lost_m));
   });
-  return html + "</table>\n";
+  return html + "</table></div>\n";
 }
 
 std::string MatingTable(const ImportedTask& task) {
@@ -156,7 +161,7 @@ std::string MatingTable(const ImportedTask& task) {
 }
 
 std::string NumbersTable(const ImportedTask& task) {
-  std::string html = "<table><tr><th>field</th><th>value</th><th>why</th></tr>\n";
+  std::string html = "<table class=\"fields\"><tr class=\"head\"><th>field</th><th>value</th><th>why</th></tr>\n";
   for (const cad::TaskNumber& n : task.content.numbers.fields) {
     html += fmt::format("<tr><th>{}</th><td>{}</td><td>{}</td></tr>\n", Html(n.field), Html(n.value), Html(n.reason));
   }
@@ -177,7 +182,8 @@ std::string TrialSection(const Trial& trial) {
   if (trial.solved)
     html += Row("verified", trial.verified ? "yes: replayed under every hypothesis" : "no: " + trial.why_not);
   html +=
-      "</table>\n<table><tr><th>episodes</th><th>policy</th><th>inserted</th><th>localized</th><th>median "
+      "</table>\n<div "
+      "class=\"wide\"><table><tr><th>episodes</th><th>policy</th><th>inserted</th><th>localized</th><th>median "
       "s</th><th>peak N</th><th>with fallbacks</th><th>failures</th></tr>\n";
   for (const TrialRun& run : trial.runs) {
     std::string failures;
@@ -190,7 +196,7 @@ std::string TrialSection(const Trial& trial) {
         run.summary.localized.successes, run.summary.sim_time_median_s, run.summary.peak_force_max_n,
         run.summary.ladder_used.successes, Html(failures));
   }
-  return html + "</table>\n";
+  return html + "</table></div>\n";
 }
 
 }  // namespace
@@ -198,7 +204,9 @@ std::string TrialSection(const Trial& trial) {
 std::string ImportReport(const ImportedTask& task, const std::optional<Trial>& trial) {
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta "
-      "charset=\"utf-8\"><title>{0}</title><style>{1}</style></head><body>\n<h1>{0}</h1>\n",
+      "charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width,initial-scale=1\"><title>{0}</title><style>{1}</style></head><body>\n<h1>{0}</"
+      "h1>\n",
       Html(task.content.name), kStyle);
   html += fmt::format("<p class=\"verdict\">{}</p>\n", Html(Verdict(task, trial)));
   if (!task.notes.empty()) {
