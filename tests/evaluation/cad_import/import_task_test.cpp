@@ -108,6 +108,21 @@ TEST_F(ImportTaskTest, OverridesAreKept) {
   EXPECT_THROW(ImportTask(options), InputError);
 }
 
+// Of a hexagon across an axis no two lines of motion end alike, and yet they end.
+TEST_F(ImportTaskTest, SidesThatSlantAreNoFlushPart) {
+  const auto speaks_of_flush = testing::Contains(testing::HasSubstr("it is flush there"));
+  ImportOptions options = OptionsFor("hex-socket", "stl");
+  const ImportedTask task = ImportTask(options);
+  EXPECT_FALSE(task.flush_x || task.flush_y);
+  EXPECT_THAT(task.notes, testing::Not(speaks_of_flush));
+  options = OptionsFor("rectangle", "step");
+  options.uncertainty_m = {0.001, 0.001, 0.001};
+  options.overrides["feeler_workspace"] = "0.003 0.003 0.01";  // no side is within reach
+  const ImportedTask inner = ImportTask(options);
+  EXPECT_TRUE(inner.flush_x && inner.flush_y);
+  EXPECT_THAT(inner.notes, speaks_of_flush);
+}
+
 /// Turns every triangle of a binary STL inside out.
 void TurnInsideOut(const std::string& file) {
   std::string bytes = env::ReadTextFile(file);
