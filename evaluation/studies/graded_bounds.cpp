@@ -199,7 +199,7 @@ void AddFigures(std::vector<Graded> all, const std::vector<Variant>& variants, E
   std::ranges::sort(all, {}, &Graded::ratio);
   const auto add = [&](const char* title, const char* y_label, bool y_log, std::size_t first, std::size_t last,
                        const auto& value, double PrintedRow::*printed, double unit) {
-    Figure figure{title, "cost of the best policy over the bound at the start", y_label, false, y_log, {}};
+    Figure figure{title, "cost of the best policy over the bound at the start", y_label, true, y_log, {}};
     for (std::size_t v = first; v < last; ++v) {
       FigureSeries series{variants[v].name, {}};
       for (const Graded& graded : all) {

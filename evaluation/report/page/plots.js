@@ -79,10 +79,17 @@ const Plots = {
 
   /** {title, x_label, y_label, x_log, y_log, series: [{name, printed, points: [{x, y, low, high}]}]} */
   lines(spec) {
-    const series = spec.series.map((s, i) => ({ ...s, color: Plots.colors[i % Plots.colors.length], dash: i >= Plots.colors.length ? "5 3" : null,
-      points: s.points.filter((p) => p.y !== null && isFinite(p.y) && (!spec.x_log || p.x > 0) && (!spec.y_log || p.y > 0)).sort((a, b) => a.x - b.x) })).filter((s) => s.points.length);
+    // "NAME, printed" is the printed value beside NAME: a dotted line of its colour.
+    const of = (s) => s.name.replace(/, printed$/, "");
+    const names = [...new Set(spec.series.map(of))];
+    const series = spec.series.map((s) => {
+      const i = names.indexOf(of(s)), printed = of(s) !== s.name;
+      return { ...s, printed, color: Plots.colors[i % Plots.colors.length], dash: printed ? "1 4" : i >= Plots.colors.length ? "5 3" : null,
+        points: s.points.filter((p) => p.y !== null && isFinite(p.y) && (!spec.x_log || p.x > 0) && (!spec.y_log || p.y > 0)).sort((a, b) => a.x - b.x) };
+    }).filter((s) => s.points.length);
     if (!series.length) return null;
-    const legend = Plots.legend(series.map((s) => ({ name: s.name, color: s.color })));
+    const legend = Plots.legend(series.filter((s) => !s.printed).map((s) => ({ name: s.name, color: s.color }))
+      .concat(series.some((s) => s.printed) ? [{ name: "dotted: printed", color: "var(--printed)" }] : []));
     return Plots.figure(spec.title, spec.note, (svg, width) => {
       const height = Math.round(Math.min(340, Math.max(230, width * 0.6)));
       const left = 52, right = 14, top = 10, bottom = height - 42;
@@ -104,7 +111,7 @@ const Plots = {
           svg.append("path").attr("class", "band").attr("fill", s.color).attr("d", d3.area().x((p) => x(p.x)).y0((p) => clampY(p.low)).y1((p) => clampY(p.high))(banded));
         }
         svg.append("path").attr("class", "line").attr("stroke", s.color).attr("stroke-dasharray", s.dash).attr("d", d3.line().x((p) => x(p.x)).y((p) => y(p.y))(s.points));
-        if (s.points.length <= 16) {
+        if (s.points.length <= 16 && !s.printed) {
           for (const p of s.points) {
             if (banded.length) svg.append("line").attr("class", "interval").attr("stroke", s.color).attr("x1", x(p.x)).attr("x2", x(p.x)).attr("y1", clampY(p.low ?? p.y)).attr("y2", clampY(p.high ?? p.y));
             svg.append("circle").attr("class", "dot").attr("cx", x(p.x)).attr("cy", y(p.y)).attr("r", 3.4).attr("fill", s.color)
