@@ -174,14 +174,31 @@ PairedSums OverHeldOut(const Compared& compared, const CostTable& costs, const w
   return sums;
 }
 
+/// Kinds of motions before the insertion.
+constexpr const char* kMotions[] = {"transfer", "probe", "retreat", "confirm", "approach"};
+
 /// Episodes in physics in which a camera looks; its mounting is that of the seed.
 struct CameraEpisodes {
-  PairedSums seconds;  ///< of episodes that both insert
+  PairedSums seconds;                         ///< of episodes that both insert
+  std::map<std::string, PairedSums> motions;  ///< by kind: how many, of those episodes
+  std::map<std::string, PairedSums> spent;    ///< and their seconds
   int inserted_equal = 0;
   int inserted_prior = 0;
   int episodes = 0;
   bool complete = false;
 };
+
+/// By kind of motion: how many, and their seconds.
+json SpentBy(const json& record) {
+  json spent = json::object();
+  for (const json& move : record.at("moves")) {
+    json& its = spent[move.at("kind").get<std::string>()];
+    if (its.is_null()) its = {0, 0.0};
+    its[0] = its[0].get<int>() + 1;
+    its[1] = its[1].get<double>() + move.at("duration_s").get<double>();
+  }
+  return spent;
+}
 
 /// Records of one mounting, by episode; from the store where they are finished. Null if it was cancelled.
 json RunMounting(const Compared& compared, bool with_prior, std::uint64_t seed,
@@ -206,7 +223,8 @@ json RunMounting(const Compared& compared, bool with_prior, std::uint64_t seed,
         records.push_back({{"episode", full.at("episode")},
                            {"inserted", full.at("inserted")},
                            {"sim_time_s", full.at("sim_time_s")},
-                           {"reason", full.at("reason")}});
+                           {"reason", full.at("reason")},
+                           {"spent", SpentBy(full)}});
       },
       {}, request.cancellation);
   if (static_cast<int>(records.size()) < protocol.episodes) return nullptr;
@@ -237,6 +255,13 @@ CameraEpisodes RunCameraEpisodes(const Compared& compared, const workflow::Calib
       all.inserted_prior += both_prior ? 1 : 0;
       if (!both_equal || !both_prior) continue;
       all.seconds.Add(mounting, equal[i].at("sim_time_s").get<double>(), prior[i].at("sim_time_s").get<double>());
+      for (const char* kind : kMotions) {
+        const json none = {0, 0.0};
+        const json by_equal = equal[i].at("spent").value(kind, none);
+        const json by_prior = prior[i].at("spent").value(kind, none);
+        all.motions[kind].Add(mounting, by_equal[0].get<double>(), by_prior[0].get<double>());
+        all.spent[kind].Add(mounting, by_equal[1].get<double>(), by_prior[1].get<double>());
+      }
     }
     if (request.progress) request.progress(mounting + 1, protocol.mountings);
   }
@@ -276,6 +301,15 @@ bool Compare(CostKind cost_kind, const workflow::Calibration& calibration, const
   AddGain(compared, "episodes", "s", episodes.seconds, true, result);
   result.text += fmt::format("{:<9} inserted {} of {} with equal weights, {} with the prior\n", "",
                              episodes.inserted_equal, episodes.episodes, episodes.inserted_prior);
+  for (const char* kind : kMotions) {
+    const auto equal_side = &std::pair<double, double>::first;
+    const auto prior_side = &std::pair<double, double>::second;
+    const PairedSums& motions = episodes.motions.at(kind);
+    const PairedSums& spent = episodes.spent.at(kind);
+    result.text += fmt::format(
+        "{:<9} {:<9} an episode: {:.1f} in {:.2f} s with equal weights, {:.1f} in {:.2f} s with the prior\n", "", kind,
+        motions.Mean(equal_side), spent.Mean(equal_side), motions.Mean(prior_side), spent.Mean(prior_side));
+  }
   result.details["inserted"][std::string(ToString(cost_kind))] = {
       {"episodes", episodes.episodes}, {"equal_weights", episodes.inserted_equal}, {"prior", episodes.inserted_prior}};
   return true;
