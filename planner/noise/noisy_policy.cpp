@@ -24,7 +24,7 @@ struct Place {
 
 /// The graph of beliefs that a policy meets, most probable first, as nodes; costs of their moves beside them.
 void Collect(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of, double least_reach,
-             const std::function<bool()>& late, NoisyPolicy& policy, std::vector<Place>& places) {
+             const std::function<bool(std::size_t)>& late, NoisyPolicy& policy, std::vector<Place>& places) {
   std::map<std::uint32_t, std::uint32_t> number = {{graph.Start(), 0}};
   std::vector<double> reach = {1.0};
   std::vector<std::uint8_t> done = {0};
@@ -38,7 +38,7 @@ void Collect(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint3
     if (done[n] != 0) continue;
     done[n] = 1;
     const std::uint32_t b = places[n].belief;
-    const bool ends = mass < least_reach || (late && late());
+    const bool ends = mass < least_reach || (late && late(places.size()));
     const GuardedMove move = ends ? GuardedMove{Direction::kPlusX, 0} : move_of(b);
     policy.nodes[n].move = move;
     if (move.cells == 0) {
@@ -169,7 +169,7 @@ class Replay {
 
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
                               double least_reach, NoisyEvaluation* evaluation, std::vector<std::uint32_t>* beliefs,
-                              const std::function<bool()>& late) {
+                              const std::function<bool(std::size_t)>& late) {
   NoisyPolicy policy;
   std::vector<Place> places;
   Collect(graph, move_of, least_reach, late, policy, places);

@@ -39,11 +39,12 @@ struct NoisyEvaluation {
 };
 
 /// The policy that makes the move `move_of(b)` at every belief it reaches from the start (cells = 0: ends). Beliefs
-/// reached with less than `least_reach` end, and all that are left, the least probable ones, once `late` (may be empty)
-/// says so. `beliefs` (may be null): of each node.
+/// reached with less than `least_reach` end, and all that are left, the least probable ones, once `late(nodes)` (may
+/// be empty) says so. `beliefs` (may be null): of each node.
 NoisyPolicy FreezeNoisyPolicy(NoisyBeliefGraph& graph, const std::function<GuardedMove(std::uint32_t)>& move_of,
                               double least_reach, NoisyEvaluation* evaluation,
-                              std::vector<std::uint32_t>* beliefs = nullptr, const std::function<bool()>& late = {});
+                              std::vector<std::uint32_t>* beliefs = nullptr,
+                              const std::function<bool(std::size_t)>& late = {});
 
 /// How often a move whose outcome leaves a belief as it is with probability `stays` is made again before that counts as
 /// giving up: so often that it happens with less than 1e-18.

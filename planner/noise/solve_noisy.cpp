@@ -30,10 +30,11 @@ constexpr std::uint32_t kRaisedBeforeStop = 16;
 /// The ends of a policy have a probability of 1 in all, up to this, which is rounding.
 constexpr double kEnds = 1e-8;
 
-/// Of a time limit so much is kept for the policy, at most so many seconds; of that a share for its replay.
+/// Of a time limit so much is kept for the policy, at most so many seconds. Its replay takes about so much CPU time a
+/// node and hypothesis.
 constexpr double kKeptShare = 0.2;
 constexpr double kMostKept_s = 5.0;
-constexpr double kReplayShare = 0.6;
+constexpr double kReplay_s = 6e-8;
 
 /// A policy that was written out, beside the first one, as an incumbent of BoundedSearch.
 class FrozenPolicy {
@@ -110,19 +111,26 @@ class NoisyRun {
     return sharing_over_ ? std::max(bound, shared_->LowerOf(robot, belief)) : bound;
   }
 
-  /// The time limits but for a share of what is kept for writing the policy out and replaying it. Reads the clocks: a
-  /// backup of a large belief takes milliseconds.
-  bool Late(double share_kept) const {
-    const auto over = [&](double used_s, double limit_s) {
-      return std::isfinite(limit_s) && used_s >= limit_s - share_kept * std::min(kKeptShare * limit_s, kMostKept_s);
+  /// The time limits but for what is kept for the policy. Reads the clocks: a backup of a large belief takes
+  /// milliseconds.
+  bool Late() const {
+    const auto over = [](double used_s, double limit_s) {
+      return std::isfinite(limit_s) && used_s >= limit_s - std::min(kKeptShare * limit_s, kMostKept_s);
     };
     return over(watch_.wall_s(), options_.time_limit_s) || over(watch_.cpu_s(), options_.cpu_limit_s);
+  }
+  /// No time is left but for the replay of a policy of so many nodes.
+  bool LateFor(std::size_t nodes) const {
+    const double replay_s = kReplay_s * static_cast<double>(nodes * graph_.noisy().problem.hypotheses.size());
+    const double waits = std::max(1.0, watch_.wall_s() / std::max(1e-3, watch_.cpu_s()));
+    return watch_.wall_s() + waits * replay_s >= options_.time_limit_s ||
+           watch_.cpu_s() + replay_s >= options_.cpu_limit_s;
   }
 
   std::optional<SolverStatus> Stop(std::int64_t expansions, std::size_t search_bytes) {
     const std::size_t bytes = bound_.bytes() + graph_.bytes() + first_.bytes() + search_bytes;
     if (bytes + (shared_ ? shared_->bytes() : 0) > options_.memory_limit_bytes) return SolverStatus::kMemoryLimit;
-    if (Late(1.0)) return SolverStatus::kTimeLimit;
+    if (Late()) return SolverStatus::kTimeLimit;
     return watch_.Stop(expansions);
   }
 
@@ -136,8 +144,8 @@ class NoisyRun {
   void Freeze(MoveOf move_of) {
     NoisyEvaluation evaluation;
     std::vector<std::uint32_t> beliefs;
-    NoisyPolicy policy =
-        FreezeNoisyPolicy(graph_, move_of, kLeastReach, &evaluation, &beliefs, [this] { return Late(kReplayShare); });
+    NoisyPolicy policy = FreezeNoisyPolicy(graph_, move_of, kLeastReach, &evaluation, &beliefs,
+                                           [this](std::size_t nodes) { return LateFor(nodes); });
     // A policy that went round for nothing would give up some time.
     const double endless = 1.0 - evaluation.right - evaluation.wrong - evaluation.given_up;
     const double never = endless > kEnds ? endless : 0.0;
@@ -199,7 +207,7 @@ class NoisyRun {
   /// Shared bounds until they, or the policy that they make, are within the gap.
   std::optional<SolverStatus> Share() {
     shared_.emplace(graph_, bound_);
-    shared_->SetClock([this] { return Late(1.0); });
+    shared_->SetClock([this] { return Late(); });
     const std::int64_t trials = result_.trials;
     const std::int64_t before = expansions_;
     std::int64_t next_policy = 1;
