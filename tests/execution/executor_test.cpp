@@ -121,6 +121,12 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
       }
       continue;
     }
+    for (const MoveRecord& m : record.moves) {
+      if (!m.predicted_m) continue;
+      EXPECT_GE((*m.predicted_m)[0], -1e-9) << m.kind << " " << m.direction;
+      EXPECT_LE((*m.predicted_m)[0], (*m.predicted_m)[1]) << m.kind << " " << m.direction;
+      EXPECT_LE((*m.predicted_m)[1], m.commanded_m + 1e-9) << m.kind << " " << m.direction;
+    }
     for (int axis = 0; axis < 2; ++axis) {
       EXPECT_LE(record.half_width_m[static_cast<std::size_t>(axis)], 0.0005);
     }
