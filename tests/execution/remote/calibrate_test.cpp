@@ -8,6 +8,7 @@
 #include <string>
 
 #include "feeler/core/error.h"
+#include "feeler/core/random.h"
 
 namespace feeler::execution {
 namespace {
@@ -16,7 +17,11 @@ namespace {
 class SpringCell final : public Robot {
  public:
   Pose ToolPose() const override { return pose_; }
-  Wrench ContactWrench() const override { return {Force(), Eigen::Vector3d::Zero()}; }
+  Wrench ContactWrench() const override {
+    Eigen::Vector3d read = Force();
+    for (int axis = 0; axis < 3 && noise_n > 0.0; ++axis) read[axis] += noise_n * random_.Normal();
+    return {read, Eigen::Vector3d::Zero()};
+  }
   void ZeroWrench() override { zero_n_ = Force() + zero_n_; }
   double Time() const override { return time_s_; }
   MotionResult Transfer(const Pose& goal) override { return Go(goal.translation(), 0.25, 1e9); }
@@ -35,6 +40,7 @@ class SpringCell final : public Robot {
   Eigen::Vector3d max_m{0.01, 0.02, 0.1};
   Eigen::Vector3d tip_m{0.001, -0.002, 0.0005};
   Eigen::Vector3d bias_n{0.0, 0.0, 8.0};
+  double noise_n = 0.0;  ///< standard deviation of each component of what is read
   double stiffness_n_m = 5e4;
   double reaction_time_s = 0.01;
   std::string detail;  ///< that every guarded motion ends with
@@ -76,6 +82,7 @@ class SpringCell final : public Robot {
   Pose pose_ = MakePose(Eigen::Vector3d(0.0, 0.0, 0.13));
   Eigen::Vector3d zero_n_ = Eigen::Vector3d::Zero();
   double time_s_ = 0.0;
+  mutable RandomStream random_{1, 0, "sensor"};
 };
 
 KnownBlock BlockOf(const SpringCell& cell) { return {cell.min_m, cell.max_m}; }
@@ -99,6 +106,18 @@ TEST(WireCalibrate, ABiasAboveTheContactForceIsFoundAndSpoilsNothing) {
     ASSERT_TRUE(found.reaction_time_s);
     EXPECT_NEAR(*found.reaction_time_s, cell.reaction_time_s, 0.15 * cell.reaction_time_s);
     EXPECT_LT((found.tool_offset_m - cell.tip_m).norm(), 5e-5) << found.tool_offset_m.transpose();
+  }
+}
+
+TEST(WireCalibrate, TheNoiseOfTheSensorIsItsSpreadAtRest) {
+  SpringCell quiet;
+  EXPECT_NEAR(*Calibrate(quiet, BlockOf(quiet)).force_noise_n, 0.0, 1e-9);
+  for (const double noise_n : {0.1, 0.5}) {
+    SpringCell cell;
+    cell.noise_n = noise_n;
+    CalibrationSettings settings;
+    settings.samples = 400;
+    EXPECT_NEAR(*Calibrate(cell, BlockOf(cell), settings).force_noise_n, noise_n, 0.1 * noise_n);
   }
 }
 
