@@ -121,6 +121,13 @@ TEST_P(OffLattice, EveryTruthIsLocalizedAndInserted) {
       }
       continue;
     }
+    for (std::size_t m = 1; m < record.moves.size(); ++m) {
+      const MoveRecord& met = record.moves[m - 1];
+      const std::string& back = record.moves[m].direction;  // empty: not along an axis
+      if (record.moves[m].kind != "retreat" || met.kind == "retreat" || met.direction.empty() || back.empty()) continue;
+      const std::string off = (met.direction[0] == '+' ? "-" : "+") + met.direction.substr(1);
+      EXPECT_EQ(back, off) << met.kind << ": a retreat goes off what was met";
+    }
     for (const MoveRecord& m : record.moves) {
       if (!m.predicted_m) continue;
       EXPECT_GE((*m.predicted_m)[0], -1e-9) << m.kind << " " << m.direction;
