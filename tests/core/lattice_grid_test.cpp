@@ -1,6 +1,6 @@
 // Laws: cells of a box are visited once each, in the order of their indices, which are 0, 1, 2, ... ; the cell of an
-// index has that index; a step along an axis changes the index by that axis' stride; an empty box has no cells; a point lies
-// in its cube, and any number in some stretch.
+// index has that index; a step along an axis changes the index by that axis' stride; an empty box has no cells; a point
+// lies in its cube, and any number in some stretch.
 #include "feeler/core/lattice_grid.h"
 
 #include <gtest/gtest.h>

@@ -84,7 +84,8 @@ std::vector<Reply> SomeReplies() {
   verdict.replay = {{"period_s", 0.05}};
   ContactReply contact;
   contact.push_n = 12.5;
-  return {welcome, StateReply{SomeState()}, result, ContactReply{}, contact, picture, episode, verdict, ErrorReply{"busy", "x"}};
+  return {welcome, StateReply{SomeState()}, result, ContactReply{}, contact, picture, episode,
+          verdict, ErrorReply{"busy", "x"}};
 }
 
 bool HasNumbers(const Request& r) {
