@@ -12,6 +12,9 @@ namespace {
 constexpr double kDrop_m = 0.0008;
 /// Stiffness along the insertion with which it is pressed, N/m: a compliant motion's own.
 constexpr double kStiffness_n_m = 4000.0;
+/// What of the force budget the press may take: what friction and the walls add comes on top, and a motion that passes
+/// the budget is stopped.
+constexpr double kPressOfBudget = 0.5;
 /// Way points per turn, and how many of them make one motion.
 constexpr int kPerTurn = 16;
 constexpr int kPerMotion = 8;
@@ -42,7 +45,9 @@ std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& 
   const MotionReport face = mover.Probe(task.insertion, (target + range * inward)[axis], "spiral", PredictedCells{});
   if (!face.contact) return PushDown(task, mover);
   const double height = face.end[axis];
-  const double pressed = height + SignOf(task.insertion) * mover.Cells(search.press_n / kStiffness_n_m);
+  const double press_n = std::min(search.press_n, kPressOfBudget * mover.options().force_budget_n);
+  const double speed_m_s = std::min({search.speed_m_s, mover.SpeedInto(u), mover.SpeedInto(v)});
+  const double pressed = height + SignOf(task.insertion) * mover.Cells(press_n / kStiffness_n_m);
   const int points = static_cast<int>(search.radius_m / search.pitch_m * kPerTurn);
   std::vector<Eigen::Vector3d> way;
   double farthest = 0.0;
@@ -53,7 +58,7 @@ std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& 
     place[axis] = pressed;
     way.push_back(place);
     if (i % kPerMotion != 0 && i != points) continue;
-    const MotionReport report = mover.Press(way, search.speed_m_s, "spiral");
+    const MotionReport report = mover.Press(way, speed_m_s, "spiral");
     way.clear();
     if (SignOf(task.insertion) * (report.end[axis] - height) > mover.Cells(kDrop_m)) {
       Eigen::Vector3d found = report.end;
