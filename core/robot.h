@@ -80,7 +80,8 @@ struct ContactResponse {
   /// the free one and never more than the held one, as the simulated contacts show.
   static constexpr double kOfFreeMass = 1.3;
 
-  double held_mass_kg = 25.0;      ///< effective mass where the tool cannot turn (met face to face)
+  /// Effective mass where the tool can neither turn nor slip aside (met face to face, with friction).
+  double held_mass_kg = 25.0;
   double free_mass_kg = 25.0;      ///< where it can (met at the tip); not above held_mass_kg
   double stiffness_n_m = 6e4;      ///< of the parts in contact, force per indentation
   double damping_ratio = 1.0;      ///< of that contact; 0: elastic

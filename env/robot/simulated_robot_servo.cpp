@@ -111,7 +111,7 @@ ContactResponse SimulatedRobot::ResponseOf(const Matrix6& mobility, const Eigen:
   }
   ContactResponse contact;
   const Matrix6 inertia = mobility.inverse();
-  contact.held_mass_kg = 1.0 / direction.dot(inertia.topLeftCorner<3, 3>().ldlt().solve(direction));
+  contact.held_mass_kg = direction.dot(inertia.topLeftCorner<3, 3>() * direction);
   contact.free_mass_kg = 1.0 / direction.dot(mobility.topLeftCorner<3, 3>() * direction);
   contact.force_noise_n = memory_.noise.force_noise_n;
   contact.reaction_time_s = 2.0 * world_.timestep_s() + memory_.noise.force_delay_s;

@@ -160,6 +160,15 @@ double Violation(const planner::ContactMap& map, const Touch& touch, const Eigen
   return least;
 }
 
+bool FacesAgree(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& target,
+                Direction insertion, int orientation) {
+  const auto agreed = std::ranges::count_if(evidence, [&](const Touch& touch) {
+    return touch.contact && !touch.is_oblique() && touch.direction == insertion &&
+           Violation(map, touch, target, orientation, 0.0) < kFacesAgree;
+  });
+  return agreed >= 2;
+}
+
 TargetFit FitTarget(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& lower,
                     const Eigen::Vector3d& upper, int orientation, const FitOptions& options) {
   const std::vector<double> xs = GridValues(lower.x(), upper.x(), options.step_cells);

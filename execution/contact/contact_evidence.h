@@ -32,6 +32,14 @@ Touch ContactAfter(const Eigen::Vector3d& start, const Eigen::Vector3d& end);
 double Violation(const planner::ContactMap& map, const Touch& touch, const Eigen::Vector3d& target, int orientation,
                  double slack_cells);
 
+/// Touches of faces that agree within this, in cells, are right: errors of tracking and of the give of a contact.
+inline constexpr double kFacesAgree = 0.1;
+
+/// Two touches along the insertion agree with a target there: its faces stand where they are thought to be. One is not
+/// enough: it may have met a lead-in, which is lower than the faces.
+bool FacesAgree(const planner::ContactMap& map, const std::vector<Touch>& evidence, const Eigen::Vector3d& target,
+                Direction insertion, int orientation);
+
 struct FitOptions {
   double violation_cells = 0.2;  ///< a touch explained worse than this counts as violated (0.4 mm at 2 mm cells)
   double slack_cells = 0.2;

@@ -28,7 +28,7 @@ std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Pro
     const double depth = displacement.dot(inward);
     Eigen::Vector3d across = displacement;
     across[AxisOf(task.insertion)] = 0.0;
-    if (across.cwiseAbs().maxCoeff() <= kReach && depth > -0.5 && depth < deepest) {
+    if (across.cwiseAbs().maxCoeff() <= kReach && depth > kAtMouth && depth < deepest) {
       mouths.push_back(h.offset.cast<double>());
     }
   }
@@ -80,8 +80,18 @@ double FarthestWallInside(const Task& task, const Mover& mover) {
   return mover.Cells(2.0 * task.tolerance.LargestLateral() + mover.options().shortfall_m);
 }
 
-bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool) {
-  return !MouthsOverTool(task, problem, tool).empty();
+std::optional<double> DeepestInside(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool) {
+  const Eigen::Vector3d inward = UnitVector(task.insertion);
+  std::optional<double> deepest;
+  for (const Eigen::Vector3d& mouth : MouthsOverTool(task, problem, tool)) {
+    deepest = std::max(deepest.value_or(kAtMouth), (tool - mouth).dot(inward));
+  }
+  return deepest;
+}
+
+bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool,
+                     double least_depth) {
+  return DeepestInside(task, problem, tool).value_or(least_depth) > least_depth;
 }
 
 std::optional<Eigen::Vector3d> LocateFromInside(const Task& task, const planner::Problem& problem, Mover& mover) {

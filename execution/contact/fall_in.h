@@ -9,9 +9,16 @@
 
 namespace feeler::execution {
 
-/// True if the tool may have slipped into the opening while it probed: some hypothesis of the start belief has its
-/// mouth over the tool (across the insertion within a cell and a quarter), less deep than the insertion.
-bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool);
+/// From this far above a mouth on the tool may be in its opening, cells: to the nearest hypothesis.
+inline constexpr double kAtMouth = -0.5;
+
+/// The tool may have slipped into the opening while it probed: some hypothesis of the start belief has its mouth over
+/// the tool (across the insertion within a cell and a quarter), less deep than the insertion.
+/// How deep in an opening the tool may stand, cells: under the highest of those mouths; empty if there is none.
+std::optional<double> DeepestInside(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool);
+/// True if that is deeper than `least_depth`.
+bool MayHaveFallenIn(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool,
+                     double least_depth = kAtMouth);
 
 /// A tool that stands inside has a wall of the opening no farther off than this, in cells: what the clearance allows is
 /// at least the tolerance, and a motion that falls short of its end by less tells of no wall.

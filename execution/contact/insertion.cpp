@@ -67,7 +67,9 @@ BelievedInsertion ApproachAndInsert(const Task& task, const planner::ContactMap&
   // In front of the opening, exactly; then near it.
   const Eigen::Vector3d gate_displacement = gate->cast<double>() + map.phase();
   // As near as a probe begins before what it may meet: the face beside the opening.
-  const double standoff = mover.options().fast_margin_cells;
+  const double standoff = FacesAgree(map, evidence, target, task.insertion, orientation)
+                              ? mover.FaceMargin()
+                              : mover.options().fast_margin_cells;
   const double gate_distance = std::max(standoff, gate_displacement.dot(out));
   for (const double distance : {gate_distance, standoff}) {
     const Eigen::Vector3d place = target + distance * out;

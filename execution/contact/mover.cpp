@@ -40,10 +40,11 @@ std::optional<Direction> DirectionOf(const Eigen::Vector3d& motion) {
   return MakeDirection(axis, motion[axis] < 0.0 ? -1 : 1);
 }
 
-Mover::Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
-             double started_s)
+Mover::Mover(Robot& robot, const LatticeFrame& frame, Direction insertion, const ExecutorOptions& options,
+             ExecutionRecord& record, double started_s)
     : robot_(robot),
       frame_(frame),
+      insertion_(insertion),
       options_(options),
       record_(record),
       start_time_s_(started_s),
@@ -58,6 +59,16 @@ Eigen::Vector3d Mover::Measure(const Pose& world_T_tool) const {
     throw ExecutionFailure("robot: the measured tool pose is not a sensible number");
   }
   return u;
+}
+
+ContactResponse Mover::ContactAlong(const Eigen::Vector3d& direction, bool held) const {
+  const ContactResponse told = robot_.Contact(frame_.world_T_estimate.linear() * direction);
+  return held || direction.dot(UnitVector(insertion_)) > kAlong ? told.Held() : told;
+}
+
+double Mover::FaceMargin() const {
+  constexpr double kErrors = 0.25;  // of tracking, and of the give of the contacts that have told of the face
+  return std::min(options_.fast_margin_cells, std::max(Cells(options_.retreat_m), kErrors));
 }
 
 void Mover::CheckLimits() const {
@@ -149,7 +160,7 @@ MotionReport Mover::FastOnce(const Eigen::Vector3d& target, const std::string& k
   const Eigen::Vector3d way = target - position_;
   double speed_m_s = options_.transfer_speed_m_s;
   if (!way.isZero()) {
-    if (unfelt_ && DirectionOf(way) == unfelt_) speed_m_s = std::min(speed_m_s, kUnfelt_m_s);
+    if (!height_known_ && DirectionOf(way) == insertion_) speed_m_s = std::min(speed_m_s, kUnfelt_m_s);
     if (free_by != FreeBy::kInside && StaysOut(target)) {
       // Whatever was met is below.
     } else if (record_.startled > 0) {
@@ -202,8 +213,7 @@ MotionReport Mover::ProbeOnce(Direction direction, double coordinate, const std:
   GuardedMotion motion;
   motion.direction = frame_.DirectionInWorld(direction);
   motion.distance_m = std::max(0.0, cells) * frame_.cell_m;
-  const ContactResponse told = robot_.Contact(motion.direction);
-  const ContactResponse contact = may_meet.long_wall ? told.Held() : told;
+  const ContactResponse contact = ContactAlong(UnitVector(direction), may_meet.long_wall);
   double& excess = record_.force_excess[static_cast<std::size_t>(direction)];
   motion.speed_m_s = std::min(options_.probe_speed_m_s, SpeedOfProbe(motion.direction, contact, may_meet) / excess);
   motion.contact_force_n = options_.contact_force_n;
@@ -265,45 +275,43 @@ double Mover::SpeedOfCarefulWay(const Eigen::Vector3d& way) const {
 
 bool Mover::StaysOut(const Eigen::Vector3d& target) const {
   if (!outmost_) return false;
-  const int axis = AxisOf(outmost_->first);
-  const double out = -SignOf(outmost_->first);
-  return std::min(out * position_[axis], out * target[axis]) >= out * outmost_->second;
+  const int axis = AxisOf(insertion_);
+  const double out = -SignOf(insertion_);
+  return std::min(out * position_[axis], out * target[axis]) >= out * *outmost_;
 }
 
 std::optional<Eigen::Vector3d> Mover::EndOfFreeWay(const Eigen::Vector3d& target) const {
   const Eigen::Vector3d way = target - position_;
-  if (!outmost_ || way.isZero() || DirectionOf(way) != outmost_->first) return std::nullopt;
-  const int axis = AxisOf(outmost_->first);
-  const double out = -SignOf(outmost_->first);
-  if (out * (position_[axis] - outmost_->second) < kLeastFree || out * (outmost_->second - target[axis]) <= 0.0) {
+  if (!outmost_ || way.isZero() || DirectionOf(way) != insertion_) return std::nullopt;
+  const int axis = AxisOf(insertion_);
+  const double out = -SignOf(insertion_);
+  if (out * (position_[axis] - *outmost_) < kLeastFree || out * (*outmost_ - target[axis]) <= 0.0) {
     return std::nullopt;
   }
-  return Eigen::Vector3d(position_ + way * ((outmost_->second - position_[axis]) / way[axis]));
+  return Eigen::Vector3d(position_ + way * ((*outmost_ - position_[axis]) / way[axis]));
 }
 
 std::vector<Eigen::Vector3d> Mover::WayOver(const Eigen::Vector3d& target) const {
   constexpr double kLonger = 1.3;  // than all of it that is still slow
   if (!outmost_) return {};
-  const int axis = AxisOf(outmost_->first);
-  const double out = -SignOf(outmost_->first);
-  const double rise = std::max(0.0, out * (outmost_->second - position_[axis]));
-  const double fall = std::max(0.0, out * (outmost_->second - target[axis]));
+  const int axis = AxisOf(insertion_);
+  const double out = -SignOf(insertion_);
+  const double rise = std::max(0.0, out * (*outmost_ - position_[axis]));
+  const double fall = std::max(0.0, out * (*outmost_ - target[axis]));
   if ((target - position_).norm() < kLonger * (rise + fall)) return {};
   std::vector<Eigen::Vector3d> way;
   for (const auto& [slow, end] : {std::pair(rise, position_), std::pair(fall, target)}) {
     if (slow <= 0.0) continue;
     way.push_back(end);
-    way.back()[axis] = outmost_->second;
+    way.back()[axis] = *outmost_;
   }
   return way;
 }
 
 double Mover::SpeedInto(const Eigen::Vector3d& direction, bool held) const {
-  const Eigen::Vector3d in_world = frame_.world_T_estimate.linear() * direction;
   const auto nearest = DirectionOf(direction);
   const double excess = nearest ? record_.force_excess[static_cast<std::size_t>(*nearest)] : 1.0;
-  const ContactResponse wall = robot_.Contact(in_world);
-  return SpeedWithinBudget(held ? wall.Held() : wall, options_.force_budget_n) / excess;
+  return SpeedWithinBudget(ContactAlong(direction, held), options_.force_budget_n) / excess;
 }
 
 MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> speed_m_s, bool rests) {

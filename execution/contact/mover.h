@@ -58,16 +58,18 @@ enum class FreeBy {
 /// record. Throws ExecutionFailure when the robot fails, answers nonsense, or the limits of the episode are exceeded.
 class Mover {
  public:
-  /// All arguments outlive the mover.
-  /// `started_s`: when the episode began, on the clock of the robot.
-  Mover(Robot& robot, const LatticeFrame& frame, const ExecutorOptions& options, ExecutionRecord& record,
-        double started_s);
+  /// All references outlive the mover. `insertion`: faces of tool and target lie across it, so that what is met along
+  /// it holds the tool, which cannot turn away. `started_s`: when the episode began, on the clock of the robot.
+  Mover(Robot& robot, const LatticeFrame& frame, Direction insertion, const ExecutorOptions& options,
+        ExecutionRecord& record, double started_s);
 
   /// Where the tool was last sent, or found at contact.
   const Eigen::Vector3d& position() const { return position_; }
   const LatticeFrame& frame() const { return frame_; }
   const ExecutorOptions& options() const { return options_; }
   double Cells(double metres) const { return metres / frame_.cell_m; }
+  /// From this far before a face that is where it is thought to be motions towards it are slow, cells.
+  double FaceMargin() const;
 
   /// From now on a contact of a fast motion is believed when it comes again at the same place. Where steps get lost
   /// (contacts are missed, or steps spent in vain) a motion that ends short without a contact goes on from there, and
@@ -103,13 +105,13 @@ class Mover {
     record_.careful = false;
     record_.startled = 0;
   }
-  /// Until a contact along the insertion, whose direction this is, has told how high the target stands, ways along it
-  /// are no faster than kUnfelt_m_s.
-  void KeepLowInto(std::optional<Direction> insertion) { unfelt_ = insertion; }
-  /// Nothing of the target stands farther out, against `insertion`, than this coordinate along it, which was felt: ways
-  /// that stay out there are free whatever surprised the tool below, and ways straight in are so up to there. After a
-  /// surprise long ways pass by there.
-  void KeepClearOf(Direction insertion, double outmost) { outmost_ = {insertion, outmost}; }
+  /// Until a contact along the insertion has told how high the target stands, ways along it are no faster than
+  /// kUnfelt_m_s.
+  void KnowHeight(bool known) { height_known_ = known; }
+  /// Nothing of the target stands farther out, against the insertion, than this coordinate along it, which was felt:
+  /// ways that stay out there are free whatever surprised the tool below, and ways straight in are so up to there.
+  /// After a surprise long ways pass by there.
+  void KeepClearOf(double outmost) { outmost_ = outmost; }
   CameraView Look() { return robot_.Look(); }
   /// Lattice coordinates of what is at `tool_T_thing` as the tool stands now.
   Eigen::Vector3d Locate(const Pose& tool_T_thing) const { return Measure(robot_.ToolPose() * tool_T_thing); }
@@ -121,6 +123,9 @@ class Mover {
   /// Where steps get lost: makes `motion` again as long as it ends short, no contact is felt, and it gets farther.
   MotionReport Onward(const std::function<MotionReport()>& motion) const;
   Eigen::Vector3d Measure(const Pose& world_T_tool) const;
+  /// Of what the tool meets along `direction` (unit vector, lattice axes); one that holds it along its length if
+  /// `held`.
+  ContactResponse ContactAlong(const Eigen::Vector3d& direction, bool held) const;
   /// The speed of a probe along `direction` (unit vector, world axes) that keeps the budget at whatever it may meet.
   double SpeedOfProbe(const Eigen::Vector3d& direction, const ContactResponse& face, const MayMeet& may_meet) const;
   /// The speed along `way` (unit vector, lattice axes) that keeps the budget at faces along any axis and at the edges
@@ -140,9 +145,10 @@ class Mover {
 
   Robot& robot_;
   const LatticeFrame& frame_;
+  Direction insertion_;
   const ExecutorOptions& options_;
-  std::optional<Direction> unfelt_;
-  std::optional<std::pair<Direction, double>> outmost_;
+  bool height_known_ = true;
+  std::optional<double> outmost_;
   ExecutionRecord& record_;
   double start_time_s_;
   double last_motion_end_s_;

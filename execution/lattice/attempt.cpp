@@ -150,7 +150,7 @@ void LocalizeAndInsert(const Episode& episode, const planner::Problem& problem, 
     return;
   }
   if (const auto outmost = Outmost(task, *problem.map, attempt)) {
-    mover.KeepClearOf(task.insertion, (*attempt.target)[AxisOf(task.insertion)] + *outmost);
+    mover.KeepClearOf((*attempt.target)[AxisOf(task.insertion)] + *outmost);
   }
   const BelievedInsertion verdict =
       ApproachAndInsert(task, *problem.map, *attempt.target, attempt.orientation, mover, attempt.evidence);
@@ -254,10 +254,10 @@ Attempt RunAttempt(const Episode& episode, const planner::Problem& problem, cons
   Attempt attempt;
   attempt.frame = FrameOf(episode.task, problem, world_T_estimate);
   attempt.possible = PossibleRegion(problem);
-  Mover mover(episode.robot, attempt.frame, episode.options, episode.record, episode.started_s);
-  if (const policies::Doubt* doubt = policy.doubt()) mover.DoubtReadings(doubt->steps_get_lost());
   const Direction insertion = episode.task.insertion;
-  if (outmost) mover.KeepClearOf(insertion, attempt.frame.center[AxisOf(insertion)] + *outmost);
+  Mover mover(episode.robot, attempt.frame, insertion, episode.options, episode.record, episode.started_s);
+  if (const policies::Doubt* doubt = policy.doubt()) mover.DoubtReadings(doubt->steps_get_lost());
+  if (outmost) mover.KeepClearOf(attempt.frame.center[AxisOf(insertion)] + *outmost);
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();
   const double off = (mover.position() - start).cwiseAbs().maxCoeff();
   if (off > 0.5) {

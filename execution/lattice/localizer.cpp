@@ -19,16 +19,13 @@ namespace {
 constexpr double kSamePlace = 0.1;
 /// A motion of its own costs so much for beginning and ending: a fast one must save more.
 constexpr double kMotion_s = 0.05;
-/// Once two touches of faces across the insertion agree within kAgree, the next face is where it is predicted but for
-/// errors of tracking and of the give of a contact: a probe of it begins kFaceMargin before it, cells. One touch is not
-/// enough: it may have met a lead-in, which is lower than the faces.
-constexpr double kFaceMargin = 0.25;
-constexpr double kAgree = 0.1;
 
 /// A wall that is met along more of the tool than this holds it: it cannot turn away. Up to here simulated contacts
 /// show no more than the mass of a tool that is met at its tip.
 constexpr double kHeld_m = 0.005;
 
+/// After a contact the tool has come off by no more than this, cells.
+constexpr double kCameOff = 1.5;
 /// A chamfer is read up to this much deeper than the face around it, cells.
 constexpr double kRim = 0.6;
 
@@ -78,7 +75,7 @@ bool Localizer::Tell(const Outcome& outcome) {
 }
 
 policies::Decision Localizer::Run() {
-  if (!face_felt_) mover_.KeepLowInto(task_.insertion);
+  mover_.KnowHeight(face_felt_);
   const double before = ThreadCpuSeconds();
   policy_.Begin(problem_);
   record_.policy_cpu_s += ThreadCpuSeconds() - before;
@@ -90,11 +87,13 @@ policies::Decision Localizer::Run() {
     }
     if (!std::holds_alternative<GuardedMove>(decision)) {
       SettleDoubt();
+      ComeOut();
       return decision;
     }
     // Readings are finer than outcomes: they may tell before the policy does.
     if (tracked_.size() == 1) {
       SettleDoubt();
+      ComeOut();
       return policies::Insert{};
     }
     const GuardedMove move = std::get<GuardedMove>(decision);
@@ -201,6 +200,7 @@ void Localizer::Feel(const GuardedMove& move, const Prediction& prediction) {
     const Eigen::Vector3d begun = mover_.position();
     const Touch touch = ProbeAlong(move, now);
     went_in_ = move.direction == task_.insertion;
+    stopped_inward_ = went_in_ && touch.contact;
     evidence_.push_back(touch);
     pending_.reset();
     if (TakeShort(move, touch)) {
@@ -259,9 +259,7 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
 }
 
 double Localizer::FastMargin(Direction direction) const {
-  const ExecutorOptions& options = mover_.options();
-  if (direction != task_.insertion || !faces_known_) return options.fast_margin_cells;
-  return std::min(options.fast_margin_cells, std::max(mover_.Cells(options.retreat_m), kFaceMargin));
+  return direction == task_.insertion && faces_known_ ? mover_.FaceMargin() : mover_.options().fast_margin_cells;
 }
 
 bool Localizer::FastIsWorth(Direction direction, double cells) const {
@@ -318,9 +316,9 @@ bool Localizer::Accept(const GuardedMove& move, const Touch& touch, const Outcom
       const TrackedHypothesis& explains = tracked_[best.value()];
       const double travel = PredictTravel(*problem_.map, explains, touch.start, touch.direction);
       if (touch.direction == task_.insertion) {
-        faces_known_ = face_felt_ && std::abs(touch.travelled - travel) < kAgree;
+        faces_known_ = face_felt_ && std::abs(touch.travelled - travel) < kFacesAgree;
         face_felt_ = true;
-        mover_.KeepLowInto(std::nullopt);
+        mover_.KnowHeight(true);
       }
       anchor_[axis] = explains.anchor[axis] + SignOf(touch.direction) * (touch.travelled - travel);
     }
@@ -406,14 +404,20 @@ MotionReport Localizer::FastFree(const Eigen::Vector3d& target, const PredictedC
   const double inward = across[AxisOf(task_.insertion)] * SignOf(task_.insertion);
   across[AxisOf(task_.insertion)] = 0.0;
   if (across.norm() < kSamePlace) {
+    stopped_inward_ = stopped_inward_ && !(inward > 0.0);
     went_in_ = went_in_ || inward > 0.0;
     return mover_.Fast(target, "transfer", predicted);
   }
-  const double slow = FarthestWallInside(task_, mover_);
-  if (went_in_ && slow < (target - begun).norm() && MayHaveFallenIn(task_, problem_, begun)) {
-    const Eigen::Vector3d first = begun + slow * (target - begun).normalized();
-    const MotionReport report = mover_.Fast(first, "transfer", std::array<double, 2>{slow, slow}, FreeBy::kInside);
-    if (report.contact) return report;
+  if (went_in_ && MayHaveFallenIn(task_, problem_, begun)) {
+    const double length = (target - begun).norm();
+    const double slow = std::min(length, FarthestWallInside(task_, mover_));
+    const Eigen::Vector3d first = begun + slow / length * (target - begun);
+    // What has stopped it was the bottom, or it stands no deeper than in the lead-in, where it can turn away.
+    const double bottom = mover_.Cells(task_.insertion_depth_m - task_.tolerance.vertical_m) - kCameOff;
+    const bool held = !stopped_inward_ || MayHaveFallenIn(task_, problem_, begun, bottom);
+    const FreeBy free_by = held ? FreeBy::kInside : FreeBy::kEstimate;
+    const MotionReport report = mover_.Fast(first, "transfer", std::array<double, 2>{slow, slow}, free_by);
+    if (report.contact || slow == length) return report;
   }
   went_in_ = false;
   return mover_.Fast(target, "transfer", predicted);
@@ -425,13 +429,29 @@ bool Localizer::FoundInside() {
   return found_inside_.has_value();
 }
 
+void Localizer::ComeOut() {
+  if (!went_in_ || stopped_inward_) return;
+  if (const auto depth = DeepestInside(task_, problem_, mover_.position())) {
+    mover_.Retreat(mover_.position() - (*depth - kAtMouth) * UnitVector(task_.insertion));
+  }
+}
+
 void Localizer::ShiftOffEdge(const Touch& touch) {
   const std::optional<Eigen::Vector3d> shift = GrazeShift(*problem_.map, tracked_, touch, mover_.options().matching);
   if (!shift || record_.grazes >= mover_.options().graze_attempts) FailOffTree(touch);
   ++record_.grazes;
+  // Where no hypothesis is right the place on the other side of the edge may be taken.
+  const Eigen::Vector3d begun = mover_.position();
+  const Direction side = DirectionOf(*shift).value();
+  const double from = begun[AxisOf(side)];
+  const MotionReport report = mover_.Probe(side, from + (*shift)[AxisOf(side)], "probe", {});
+  if (report.contact) {
+    evidence_.push_back(MakeTouch(side, from, report));
+    mover_.Retreat(begun);
+    FailOffTree(touch);
+  }
   anchor_ += *shift;
   for (TrackedHypothesis& t : tracked_) t.anchor += *shift;
-  mover_.Retreat(mover_.position() + *shift);
 }
 
 void Localizer::RetreatFromContact(Direction direction) {
@@ -442,7 +462,7 @@ void Localizer::RetreatFromContact(Direction direction) {
   const double to_wall = SignOf(direction) * (wall - station[axis]);
   // Not nearer than that, and no farther off a face than needed: what touches it next goes that way slowly.
   if (to_wall < room || (direction == task_.insertion && faces_known_)) {
-    kept_offset_[axis] = SignOf(direction) * (to_wall - std::max(room, std::min(to_wall, kFaceMargin)));
+    kept_offset_[axis] = SignOf(direction) * (to_wall - std::max(room, std::min(to_wall, mover_.FaceMargin())));
   }
   // What it has met may be the lead-in of an opening, and the face beside it higher.
   lifted_ = direction == task_.insertion && !faces_known_ && MayHaveFallenIn(task_, problem_, mover_.position());

@@ -89,6 +89,9 @@ class Localizer {
   int CountOutcomes(const GuardedMove& move) const;
   /// The tool has come off the contact of a reading that nothing explains: is it inside the opening?
   bool FoundInside();
+  /// Straight out of the opening that the tool may stand in after it went in and met nothing: who takes over goes
+  /// aside.
+  void ComeOut();
   /// Fast to a place that the belief knows a free way to. The opening is closed to the belief: the first way across
   /// after one along the insertion begins slowly where the tool may have slipped in, up to where its walls would be.
   MotionReport FastFree(const Eigen::Vector3d& target, const PredictedCells& predicted);
@@ -106,10 +109,11 @@ class Localizer {
   std::vector<Touch> evidence_;
   Cell robot_;
   Eigen::Vector3d anchor_ = Eigen::Vector3d::Zero();
-  bool face_felt_ = false;    ///< there was a contact along the insertion
-  bool faces_known_ = false;  ///< the last one was where the one before it had put it
-  bool went_in_ = false;      ///< along the insertion, and not yet across it
-  bool lifted_ = false;       ///< the tool stands kRim above Station(), off what may be a lead-in
+  bool face_felt_ = false;       ///< there was a contact along the insertion
+  bool faces_known_ = false;     ///< the last one was where the one before it had put it
+  bool went_in_ = false;         ///< along the insertion, and not yet across it
+  bool stopped_inward_ = false;  ///< the last motion along the insertion ended at a contact
+  bool lifted_ = false;          ///< the tool stands kRim above Station(), off what may be a lead-in
   Eigen::Vector3d kept_offset_ = Eigen::Vector3d::Zero();  ///< where a retreat ended off the lattice point
   std::optional<Eigen::Vector3d> found_inside_;
   std::optional<Direction> pending_;  ///< the tool still has to go this way to Station()

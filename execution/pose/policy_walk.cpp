@@ -16,6 +16,9 @@ namespace {
 
 /// Between lattice orientations a wall may lie this much nearer than under any of them, cells.
 constexpr double kFreeMargin = 1.5;
+/// Readings between lattice orientations may have left the wrong hypotheses: walls were met by up to so many cells
+/// nearer than all that are left predict.
+constexpr double kSure = 5.0;
 /// A reading worse than this counts as no worse: no single one rules a hypothesis out.
 constexpr double kMisfitCap = 3.0;
 /// Tool and lattice may differ by this, cells.
@@ -90,6 +93,7 @@ policies::Insert PolicyWalk::Run(std::vector<FeltMotion>& felt, const std::funct
       if (pending_ && pending_direction_ != move->direction && !Flush(felt)) return {};
       pending_ = true;
       pending_direction_ = move->direction;
+      pending_clear_ = nearest - move->cells;
       if (!TakeOver(*move, {static_cast<double>(move->cells), false})) return {};
       continue;
     }
@@ -120,14 +124,14 @@ bool PolicyWalk::Flush(std::vector<FeltMotion>& felt) {
   Eigen::Vector3d target = from;
   target[axis] = Station()[axis];
   if (SignOf(pending_direction_) * (target[axis] - from[axis]) < 0.05) return true;
-  const MotionReport report = FastPast(target, pending_direction_);
+  const MotionReport report = FastPast(target, pending_direction_, pending_clear_);
   felt.push_back(FeltFrom(mover_.frame(), pending_direction_, from, report, kFastSigma_m));
   if (!report.contact) return true;
   mover_.Retreat(report.end - std::min(1.0, (report.end - from).norm()) * UnitVector(pending_direction_));
   return false;
 }
 
-MotionReport PolicyWalk::FastPast(const Eigen::Vector3d& target, Direction direction) {
+MotionReport PolicyWalk::FastPast(const Eigen::Vector3d& target, Direction direction, double clear) {
   const std::optional<Eigen::Vector3d>& met = met_[static_cast<std::size_t>(IndexOf(direction))];
   const int axis = AxisOf(direction);
   const int sign = SignOf(direction);
@@ -142,7 +146,14 @@ MotionReport PolicyWalk::FastPast(const Eigen::Vector3d& target, Direction direc
       if (report.contact || past == target) return report;
     }
   }
-  return mover_.Fast(target, "transfer");
+  Eigen::Vector3d sure = target;
+  sure[axis] -= sign * std::max(0.0, kSure - clear);
+  if (sure == target) return mover_.Fast(target, "transfer");
+  if (sign * (sure[axis] - mover_.position()[axis]) >= kShortestFast) {
+    const MotionReport report = mover_.Fast(sure, "transfer");
+    if (report.contact) return report;
+  }
+  return mover_.Fast(target, "transfer", {}, FreeBy::kEstimate);
 }
 
 PolicyWalk::Reading PolicyWalk::Feel(const GuardedMove& move, double nearest, double farthest,
@@ -159,7 +170,7 @@ PolicyWalk::Reading PolicyWalk::Feel(const GuardedMove& move, double nearest, do
   if (fast + behind >= kShortestFast) {
     Eigen::Vector3d target = begun;
     target[axis] = station + sign * fast;
-    const MotionReport report = FastPast(target, move.direction);
+    const MotionReport report = FastPast(target, move.direction, nearest - fast);
     // A contact at speed is read late: come off and feel again slowly.
     if (report.contact) mover_.Retreat(report.end - UnitVector(move.direction));
   }

@@ -62,9 +62,10 @@ class PolicyWalk {
   /// Tells the policy the outcome that explains the reading best. False: it knows none.
   bool TakeOver(const GuardedMove& move, const Reading& reading);
   bool Flush(std::vector<FeltMotion>& felt);
-  /// Fast along an axis; past a place beside which a wall was met in this direction no faster than the budget allows:
-  /// the edge may be farther off than the policy knows.
-  MotionReport FastPast(const Eigen::Vector3d& target, Direction direction);
+  /// Fast along an axis; no faster than the budget allows past a place beside which a wall was met in this direction,
+  /// as the edge may be farther off than the policy knows, and where one may come within kSure. `clear`: cells behind
+  /// `target` that are free under every hypothesis left.
+  MotionReport FastPast(const Eigen::Vector3d& target, Direction direction, double clear);
   Eigen::Vector3d Station() const { return robot_.cast<double>() + problem_.map->phase(); }
 
   const planner::Problem& problem_;
@@ -75,6 +76,7 @@ class PolicyWalk {
   Cell robot_;
   bool pending_ = false;  ///< the tool still has to go to Station()
   Direction pending_direction_ = Direction::kPlusX;
+  double pending_clear_ = 0.0;  ///< cells behind Station() that are free under every hypothesis left
   std::array<std::optional<Eigen::Vector3d>, kDirectionCount> met_;  ///< where the tool last met a wall in a direction
 };
 

@@ -58,7 +58,7 @@ class PoseAttempt {
         policy_(policy),
         model_(model),
         frame_(FrameOf(episode.task, problem, world_T_estimate)),
-        mover_(episode.robot, frame_, episode.options, episode.record, episode.started_s),
+        mover_(episode.robot, frame_, episode.task.insertion, episode.options, episode.record, episode.started_s),
         along_(AxisOf(episode.task.insertion)),
         out_(-SignOf(episode.task.insertion)) {
     SetBox();
@@ -325,7 +325,8 @@ class PoseAttempt {
     if (out_ * (clear - up[along_]) > 0.02) up[along_] = clear;
     if (!ComeUp(up, "approach")) return {false, false, "insertion: unexpected contact on the way up"};
     const LatticeFrame aligned{world_T_target, Eigen::Vector3d::Zero(), frame_.cell_m};
-    Mover mover(episode_.robot, aligned, episode_.options, episode_.record, episode_.started_s);
+    Mover mover(episode_.robot, aligned, episode_.task.insertion, episode_.options, episode_.record,
+                episode_.started_s);
     const Eigen::Vector3d outward = out_ * Eigen::Vector3d::Unit(along_);
     BelievedInsertion verdict{false, true, "insertion: unexpected contact in front of the opening"};
     bool met = false;

@@ -43,7 +43,7 @@ void Log(const Episode& episode, const char* rung, std::string reason) {
 }
 
 Mover MoverFor(const Episode& episode, const LatticeFrame& frame) {
-  return {episode.robot, frame, episode.options, episode.record, episode.started_s};
+  return {episode.robot, frame, episode.task.insertion, episode.options, episode.record, episode.started_s};
 }
 
 /// Off whatever the tool stands on, straight out of the opening.
@@ -186,7 +186,7 @@ void FitYaw(const Episode& episode, const planner::Problem& problem, Attempt& at
   const planner::ContactMap& map = *problem.map;
   Mover mover = MoverFor(episode, attempt.frame);
   if (const auto outmost = Outmost(task, map, attempt)) {
-    mover.KeepClearOf(task.insertion, (*attempt.target)[AxisOf(task.insertion)] + *outmost);
+    mover.KeepClearOf((*attempt.target)[AxisOf(task.insertion)] + *outmost);
   }
   ComeOff(task, *attempt.target, mover);
   if (attempt.astray && !FindSides(task, map, mover, attempt)) return;
@@ -260,7 +260,7 @@ void AtMouth(void (*rung)(const Episode&, const planner::Problem&, Attempt&), co
 void GoToStart(const Episode& episode, const planner::Problem& problem, const LatticeFrame& frame,
                const std::optional<double>& outmost) {
   Mover mover = MoverFor(episode, frame);
-  if (outmost) mover.KeepClearOf(episode.task.insertion, frame.center[AxisOf(episode.task.insertion)] + *outmost);
+  if (outmost) mover.KeepClearOf(frame.center[AxisOf(episode.task.insertion)] + *outmost);
   const int axis = AxisOf(episode.task.insertion);
   const double out = -SignOf(episode.task.insertion);
   const Eigen::Vector3d start = problem.start.cast<double>() + problem.map->phase();

@@ -35,7 +35,8 @@ std::optional<ContactSpeeds> NominalContactSpeeds(const env::TaskModel& model, d
   speeds.budget_n = budget_n;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    const ContactResponse contact = environment.robot().Contact(model.task.world_T_target.linear().col(axis));
+    ContactResponse contact = environment.robot().Contact(model.task.world_T_target.linear().col(axis));
+    if (axis == AxisOf(model.task.insertion)) contact = contact.Held();  // faces lie across it, as execution/ counts
     const double speed_m_s = execution::SpeedWithinBudget(contact, budget_n);
     speeds.speed_m_s[i] = std::max(1.0, std::floor(speed_m_s / kRounded_m_s)) * kRounded_m_s;
     speeds.stiffness_n_m[i] = contact.stiffness_n_m;

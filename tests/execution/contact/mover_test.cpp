@@ -81,7 +81,7 @@ struct Bench {
     options.probe_speed_m_s = 1.0;
   }
   double Probe(Direction direction, const MayMeet& may_meet = {}) {
-    Mover mover(robot, frame, options, record, 0.0);  // movers come and go within an episode
+    Mover mover(robot, frame, Direction::kMinusZ, options, record, 0.0);  // movers come and go within an episode
     mover.Probe(direction, mover.position()[AxisOf(direction)] + SignOf(direction) * 2.0, "probe", {}, may_meet);
     return record.moves.back().peak_force_n;
   }
@@ -105,7 +105,7 @@ TEST(Mover, AContactThatIsHarderThanToldIsNotMetTwice) {
 
 TEST(Mover, AContactAsToldChangesNothing) {
   Bench bench(1.0);
-  for (int i = 0; i < 4; ++i) EXPECT_NEAR(bench.Probe(Direction::kMinusZ), kShareOfBudget * 20.0, 1e-9);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(bench.Probe(Direction::kMinusY), kShareOfBudget * 20.0, 1e-9);
 }
 
 TEST(Mover, WhatHoldsTheToolIsMetSlower) {
@@ -115,6 +115,17 @@ TEST(Mover, WhatHoldsTheToolIsMetSlower) {
   bench.Probe(Direction::kPlusX, {.long_wall = true, .edge_towards = {}});
   const ContactResponse told = bench.robot.Contact(Eigen::Vector3d::UnitX());
   EXPECT_NEAR(free_m_s / bench.robot.speeds_m_s.back(), told.held_mass_kg / told.mass_kg(), 1e-9);
+}
+
+// Faces lie across the insertion: the tool cannot turn away from them. Out of the opening nothing holds it.
+TEST(Mover, FacesAlongTheInsertionAreMetAsSlowAsWhatHoldsTheTool) {
+  Bench bench(1.0);
+  bench.Probe(Direction::kPlusZ);
+  const double free_m_s = bench.robot.speeds_m_s.back();
+  bench.Probe(Direction::kMinusZ);
+  const ContactResponse told = bench.robot.Contact(-Eigen::Vector3d::UnitZ());
+  EXPECT_NEAR(free_m_s / bench.robot.speeds_m_s.back(), told.held_mass_kg / told.mass_kg(), 1e-9);
+  EXPECT_NEAR(bench.robot.speeds_m_s.back() * ForcePerSpeed(told.Held()), kShareOfBudget * 20.0, 1e-9);
 }
 
 TEST(Mover, AnEdgeIsMetSlowEnoughForEveryNormal) {
@@ -134,7 +145,7 @@ TEST(Mover, AnEdgeIsMetSlowEnoughForEveryNormal) {
 
 TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {
   Bench bench(1.0);
-  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
   mover.Fast({4.0, 0.0, 0.0}, "transfer");
   EXPECT_DOUBLE_EQ(bench.robot.speeds_m_s.back(), bench.options.transfer_speed_m_s);
   EXPECT_GT(bench.record.moves.back().peak_force_n, 20.0);
@@ -147,7 +158,7 @@ TEST(Mover, TransfersAreCarefulOnceOneMetSomethingHard) {
 TEST(Mover, TransfersAreCarefulOnceOneMetAnythingUnforeseen) {
   for (const bool foreseen : {true, false}) {
     Bench bench(0.1);
-    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
     mover.Fast({4.0, 0.0, 0.0}, "transfer",
                foreseen ? PredictedCells(std::array<double, 2>{1.0, 4.0}) : PredictedCells());
     EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
@@ -166,18 +177,19 @@ TEST(Mover, WaysOverAllThatWasFeltAreFastWhateverIsBelow) {
     mover.Fast(to, "transfer", std::array<double, 2>{0.0, 100.0});
     return bench.robot.speeds_m_s.back();
   };
-  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
   EXPECT_LT(speed_to(mover, {0.0, 0.0, 6.0}), fast_m_s) << "nothing was told";
-  mover.KeepClearOf(Direction::kMinusZ, 5.0);
+  mover.KeepClearOf(5.0);
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 5.5}), fast_m_s);
   EXPECT_LT(speed_to(mover, {20.0, 0.0, 4.5}), fast_m_s) << "down into it";
   EXPECT_LT(speed_to(mover, {20.5, 0.0, 4.5}), fast_m_s) << "below";
   EXPECT_LT(speed_to(mover, {20.5, 0.1, 5.0}), fast_m_s) << "out of it";
   EXPECT_EQ(speed_to(mover, {20.0, 0.0, 8.0}), fast_m_s);
   // Out is against the insertion, along any axis.
-  mover.KeepClearOf(Direction::kPlusX, 30.0);
-  EXPECT_EQ(speed_to(mover, {29.5, 0.0, 0.0}), fast_m_s);
-  EXPECT_LT(speed_to(mover, {31.0, 0.0, 0.0}), fast_m_s);
+  Mover along_x(bench.robot, bench.frame, Direction::kPlusX, bench.options, bench.record, 0.0);
+  along_x.KeepClearOf(30.0);
+  EXPECT_EQ(speed_to(along_x, {29.5, 0.0, 0.0}), fast_m_s);
+  EXPECT_LT(speed_to(along_x, {31.0, 0.0, 0.0}), fast_m_s);
 }
 
 // A careful way straight in is fast up to what stands out farthest; the two motions make the whole way.
@@ -185,9 +197,9 @@ TEST(Mover, GoesFastDownToWhatItIsToKeepClearOf) {
   Bench bench(1.0);
   bench.record.careful = true;
   bench.robot.meets = false;
-  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
   mover.Retreat({20.0, 0.0, 12.0});
-  mover.KeepClearOf(Direction::kMinusZ, 5.0);
+  mover.KeepClearOf(5.0);
   const std::size_t before = bench.robot.speeds_m_s.size();
   mover.Fast({20.0, 0.0, 2.0}, "transfer", {{{8.0, 9.0}}});
   ASSERT_EQ(bench.robot.speeds_m_s.size(), before + 2);
@@ -218,8 +230,8 @@ TEST(Mover, LongWaysAfterASurprisePassOverTheTarget) {
     Bench bench(1.0);
     bench.robot.meets = false;
     bench.record.startled = startled;
-    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
-    mover.KeepClearOf(Direction::kMinusZ, 3.0);
+    Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
+    mover.KeepClearOf(3.0);
     EXPECT_FALSE(mover.Fast(to, "transfer").contact);
     EXPECT_EQ(mover.position(), to);
     return bench.robot.speeds_m_s;
@@ -238,9 +250,9 @@ TEST(Mover, LongWaysAfterASurprisePassOverTheTarget) {
   {
     Bench bench(1.0);
     bench.robot.meets = false;
-    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
     mover.Retreat({0.0, 0.0, 6.0});
-    mover.KeepClearOf(Direction::kMinusZ, 3.0);
+    mover.KeepClearOf(3.0);
     bench.record.startled = 2;
     const std::size_t before = bench.robot.speeds_m_s.size();
     mover.Fast({20.0, 5.0, 1.0}, "transfer");
@@ -258,7 +270,7 @@ TEST(Mover, AsksForContactsAlongUnitVectors) {
   bench.robot.stiff_n_m = Eigen::Vector3d(2e4, 2e4, 9e4);
   for (const Eigen::Vector3d& to : {Eigen::Vector3d(-5.0, 4.0, 6.6), Eigen::Vector3d(0.0, 3.0, -3.0)}) {
     bench.record.startled = 1;
-    Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+    Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
     mover.Fast(mover.position() + to, "transfer");
     EXPECT_LT(bench.robot.speeds_m_s.back(), bench.options.transfer_speed_m_s);
   }
@@ -267,7 +279,7 @@ TEST(Mover, AsksForContactsAlongUnitVectors) {
 TEST(Mover, RecoveryKeepsWithinTheBudgetFromItsStart) {
   Bench bench(1.0);
   bench.record.FallBack("refit", "off the policy tree");
-  Mover mover(bench.robot, bench.frame, bench.options, bench.record, 0.0);
+  Mover mover(bench.robot, bench.frame, Direction::kMinusZ, bench.options, bench.record, 0.0);
   mover.Fast({4.0, 0.0, 0.0}, "transfer");
   EXPECT_LE(bench.record.moves.back().peak_force_n, 20.0);
   mover.Insert({4.0, 0.0, -6.0}, bench.options.transfer_speed_m_s, false);

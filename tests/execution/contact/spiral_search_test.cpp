@@ -66,7 +66,7 @@ TEST(SpiralSearch, KeepsPressAndSpeedWithinTheBudget) {
     ExecutorOptions options;
     options.force_budget_n = budget_n;
     ExecutionRecord record;
-    Mover mover(robot, frame, options, record, 0.0);
+    Mover mover(robot, frame, Direction::kMinusZ, options, record, 0.0);
     EXPECT_FALSE(FindBySpiral(Task{}, Eigen::Vector3d::Zero(), search, mover));
     EXPECT_NEAR(kStiffness_n_m * robot.deepest_m, std::min(20.0, 0.5 * budget_n), 1e-6) << budget_n;
     EXPECT_NEAR(robot.fastest_m_s, std::min(0.08, SpeedWithinBudget(ContactResponse{}, budget_n)), 1e-9) << budget_n;

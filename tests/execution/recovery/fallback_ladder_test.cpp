@@ -233,7 +233,7 @@ TEST(YawFit, EqualsTheYawOfTheWorld) {
     KinematicRobot robot(HousingOverPanel(), task, truth, MakePose({0.0, 0.0, 0.02}), {}, RandomStream(3, 1, "robot"));
     ExecutionRecord record;
     const ExecutorOptions options;
-    Mover mover(robot, frame, options, record, 0.0);
+    Mover mover(robot, frame, Direction::kMinusZ, options, record, 0.0);
     std::vector<Touch> evidence;
     const auto fit = MeasureYaw(task, *HousingMap(), Eigen::Vector3d::Zero(), 0, mover, evidence);
     ASSERT_TRUE(fit) << degrees;
@@ -258,7 +258,7 @@ Centring Centre(Sides sides, double slack, const Eigen::Vector3d& off) {
                        RandomStream(3, 1, "robot"));
   ExecutionRecord record;
   const ExecutorOptions options;
-  Mover mover(robot, frame, options, record, 0.0);
+  Mover mover(robot, frame, Direction::kMinusZ, options, record, 0.0);
   Centring found;
   found.centre = Recenter(task, *HousingMap(), Eigen::Vector3d::Zero(), 0, sides, slack, mover);
   for (const MoveRecord& move : record.moves) found.touches += move.kind == "confirm" ? 1 : 0;

@@ -58,14 +58,18 @@ TEST_F(ContactResponseTest, EffectiveMassIsThatOfInertiaAndJacobian) {
   Place({0.01, 0.0, 0.02});
   const Eigen::Vector3d u = Eigen::Vector3d(0.3, -0.4, 0.6).normalized();
   const Matrix6 jacobian = ToolJacobian(*scene_, robot_.q_rad());
-  // M a = J_t^T u f + J_r^T l with J_r a = 0: the acceleration along u of a force f with the rotation held.
-  Eigen::Matrix<double, 9, 9> held = Eigen::Matrix<double, 9, 9>::Zero();
+  // M a = J_t^T u f + C^T l with C a = 0: the acceleration along u of a force f, the rotation and both ways aside held.
+  const Eigen::Vector3d aside = u.unitOrthogonal();
+  Eigen::Matrix<double, 5, 6> constraint;
+  constraint << jacobian.bottomRows<3>(), aside.transpose() * jacobian.topRows<3>(),
+      u.cross(aside).transpose() * jacobian.topRows<3>();
+  Eigen::Matrix<double, 11, 11> held = Eigen::Matrix<double, 11, 11>::Zero();
   held.topLeftCorner<6, 6>() = robot_.world().Inertia();
-  held.topRightCorner<6, 3>() = -jacobian.bottomRows<3>().transpose();
-  held.bottomLeftCorner<3, 6>() = jacobian.bottomRows<3>();
-  Eigen::Matrix<double, 9, 1> force = Eigen::Matrix<double, 9, 1>::Zero();
+  held.topRightCorner<6, 5>() = -constraint.transpose();
+  held.bottomLeftCorner<5, 6>() = constraint;
+  Eigen::Matrix<double, 11, 1> force = Eigen::Matrix<double, 11, 1>::Zero();
   force.head<6>() = jacobian.topRows<3>().transpose() * u;
-  const Eigen::Matrix<double, 9, 1> answer = held.fullPivLu().solve(force);
+  const Eigen::Matrix<double, 11, 1> answer = held.fullPivLu().solve(force);
   EXPECT_NEAR(robot_.Contact(u).held_mass_kg * u.dot(jacobian.topRows<3>() * answer.head<6>()), 1.0, 1e-9);
 }
 
