@@ -27,8 +27,9 @@ void RunSolver(SolveRun& run) {
 
 /// One attempt, from the start belief to the result; the accounts in it are those of all attempts so far.
 SolverResult Attempt(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
-                     const Experience& experience, StopWatch& watch, bool canonical) {
-  SolveRun run(problem, options, tables, experience, watch, canonical);
+                     const Experience& experience, StopWatch& watch, bool canonical,
+                     const PolicyGraph* known = nullptr) {
+  SolveRun run(problem, options, tables, experience, watch, canonical, known);
   SolverResult& result = run.result;
   if (run.start == kNoBelief) {
     result.policy = FreezePolicy(run.graph, [](BeliefId) { return GuardedMove(); });
@@ -40,7 +41,7 @@ SolverResult Attempt(const Problem& problem, const SolverOptions& options, const
     result.lower_bound = std::min(result.lower_bound, result.expected_cost);  // rounding
     result.policy->lower_bound = result.lower_bound;
   }
-  if (options.on_bounds) run.Row(result.trials, result.expansions, result.lower_bound, result.expected_cost);
+  run.Row(result.trials, result.expansions, result.lower_bound, result.expected_cost);
   watch.EndAttempt(result.expansions);
   return std::move(result);
 }
@@ -60,15 +61,6 @@ bool Cancelled(const SolverOptions& options) {
 /// Attempts until one has a policy that stays in the workspace, or a limit holds.
 SolverResult SolveInWorkspace(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
                               const Experience& experience, StopWatch& watch) {
-  if (!problem.generous_workspace) {
-    auto pairs = IndistinguishablePairs(problem, tables.masks());
-    if (!pairs.empty()) {
-      SolverResult result = WithoutPolicy(SolverStatus::kUnlocalizable);
-      result.lower_bound = kInfinity;
-      result.indistinguishable = std::move(pairs);
-      return result;
-    }
-  }
   const bool canonical =
       options.canonical_translation && problem.generous_workspace && options.solver != SolverKind::kERtdpBel;
   SolverResult first = Attempt(problem, options, tables, experience, watch, canonical);
@@ -92,14 +84,49 @@ SolverResult SolveInWorkspace(const Problem& problem, const SolverOptions& optio
   return result;
 }
 
+/// Weights rule out translates that count as one, and bounds that are tight. So the problem is solved as if all
+/// hypotheses were equally likely first, with half of what the limits allow; what that policy costs under the weights
+/// is then known, and the search for the weights begins with it.
+SolverResult SolveFromEqualWeights(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+                                   StopWatch& watch) {
+  Problem equal = problem;
+  for (Hypothesis& h : equal.hypotheses) h.weight = 1.0;
+  SolverOptions quiet = options;  // its bounds are those of another problem
+  quiet.on_bounds = nullptr;
+  watch.LimitTo(0.5);
+  const SolverResult first = SolveInWorkspace(equal, quiet, tables, {}, watch);
+  watch.LimitTo(1.0);
+  if (first.status == SolverStatus::kUnlocalizable) return first;
+  return Attempt(problem, options, tables, {}, watch, false, first.policy ? &*first.policy : nullptr);
+}
+
+SolverResult SolveByAttempts(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
+                             const Experience& experience, StopWatch& watch) {
+  if (!problem.generous_workspace) {
+    auto pairs = IndistinguishablePairs(problem, tables.masks());
+    if (!pairs.empty()) {
+      SolverResult result = WithoutPolicy(SolverStatus::kUnlocalizable);
+      result.lower_bound = kInfinity;
+      result.indistinguishable = std::move(pairs);
+      return result;
+    }
+  }
+  const bool equal_weights_help = options.solver == SolverKind::kCertified && options.canonical_translation &&
+                                  problem.generous_workspace && !EquallyLikely(problem);
+  if (equal_weights_help) return SolveFromEqualWeights(problem, options, tables, watch);
+  return SolveInWorkspace(problem, options, tables, experience, watch);
+}
+
 }  // namespace
 
 SolveRun::SolveRun(const Problem& problem, const SolverOptions& solver_options, const PlanningTables& planning_tables,
-                   const Experience& given_experience, StopWatch& stop_watch, bool canonical)
+                   const Experience& given_experience, StopWatch& stop_watch, bool canonical,
+                   const PolicyGraph* known_policy)
     : options(solver_options),
       tables(planning_tables),
       experience(given_experience),
       watch(stop_watch),
+      known(known_policy),
       graph(problem, tables.masks(), canonical),
       heuristic(tables.MakeHeuristic(problem, graph.sets())) {
   if (options.solver == SolverKind::kCertified && options.heuristic == HeuristicKind::kCertificate &&
@@ -120,6 +147,7 @@ std::optional<SolverStatus> SolveRun::Stop(std::int64_t expansions, std::size_t 
 }
 
 void SolveRun::Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) const {
+  if (!options.on_bounds) return;
   options.on_bounds({watch.wall_s(), trials, watch.expansions_before() + expansions, lower, upper});
 }
 
@@ -164,7 +192,7 @@ SolverResult Solve(const Problem& problem, const SolverOptions& options, std::sh
   if (!tables) tables = BuildPlanningTables(problem, options);
   // Tables are incomplete where a cancellation came while they were built.
   SolverResult result = Cancelled(options) ? WithoutPolicy(SolverStatus::kCancelled)
-                                           : SolveInWorkspace(problem, options, *tables, experience, watch);
+                                           : SolveByAttempts(problem, options, *tables, experience, watch);
   result.expansions = watch.expansions_before();
   result.wall_s = watch.wall_s();
   result.cpu_s = watch.cpu_s();

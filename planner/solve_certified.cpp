@@ -4,6 +4,7 @@
 
 #include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/planner/search/bounded_search.h"
+#include "feeler/planner/search/given_policy.h"
 #include "feeler/planner/search/greedy_completion.h"
 #include "feeler/planner/search/open_policy.h"
 #include "feeler/planner/search/random_judgement.h"
@@ -45,8 +46,15 @@ std::function<std::optional<SolverStatus>(std::int64_t)> FirstPolicyStop(SolveRu
   return [&run, &search](std::int64_t expansions) {
     const std::optional<SolverStatus> why = run.Stop(expansions, search.bytes());
     const bool budget = why == SolverStatus::kTimeLimit || why == SolverStatus::kExpansionLimit;
-    return run.options.first_policy_in_any_case && budget ? std::nullopt : why;
+    return run.options.first_policy_in_any_case && budget && run.known == nullptr ? std::nullopt : why;
   };
+}
+
+/// The policy that is known beforehand, if any, and what it is worth here.
+void TakeKnown(SolveRun& run, Greedy& greedy) {
+  if (run.known == nullptr) return;
+  const MoveMap moves = MovesOf(run.graph, *run.known);
+  greedy.Take(run.start, [&](BeliefId b) { return run.graph.ActionOf(b, moves.at(b)); });
 }
 
 /// The greedy policy. False, and says why in the result, if some hypotheses cannot be told apart or it was stopped.
@@ -54,6 +62,7 @@ bool Complete(SolveRun& run, Greedy& greedy) {
   const auto why = greedy.Run(run.start, FirstPolicyStop(run, greedy));
   run.result.expansions = greedy.expansions();
   if (!why) return true;
+  if (greedy.Solved(run.start)) return true;  // by the policy that was known
   run.result.status = *why;
   if (why == SolverStatus::kUnlocalizable) {
     run.result.lower_bound = std::numeric_limits<double>::infinity();
@@ -135,6 +144,7 @@ void SolveWithOpenings(SolveRun& run, const Problem& filled, Greedy& greedy) {
 void SolveCertified(SolveRun& run) {
   run.result.lower_bound = BoundAtStart(run);
   Greedy greedy(run.graph, EstimateOf(run));
+  TakeKnown(run, greedy);
   if (const std::optional<Problem> filled = WithoutDeadEnds(run)) return SolveWithOpenings(run, *filled, greedy);
   if (!Complete(run, greedy)) return;
   if (Oriented(run)) Improve(run, greedy);

@@ -16,9 +16,9 @@ namespace feeler::planner {
 /// One attempt at a problem, as the solvers share it: the belief graph with its heuristic, the stop condition, and the
 /// result that a solver fills in.
 struct SolveRun {
-  /// `watch` is the one of all attempts. Everything outlives the run.
+  /// `watch` is the one of all attempts; `known` a valid policy for the problem, or null. Everything outlives the run.
   SolveRun(const Problem& problem, const SolverOptions& options, const PlanningTables& tables,
-           const Experience& experience, StopWatch& watch, bool canonical);
+           const Experience& experience, StopWatch& watch, bool canonical, const PolicyGraph* known);
   SolveRun(const SolveRun&) = delete;
   SolveRun& operator=(const SolveRun&) = delete;
 
@@ -41,6 +41,7 @@ struct SolveRun {
   const PlanningTables& tables;
   const Experience& experience;
   StopWatch& watch;
+  const PolicyGraph* known;  ///< to begin with (certified solver); null: none
   BeliefGraph graph;
   std::unique_ptr<BeliefHeuristic> heuristic;
   BeliefId start = kNoBelief;  ///< none: the problem is solved before the first move

@@ -165,6 +165,20 @@ void BeliefGraph::Expand(BeliefId b) {
   beliefs_[b].action_count = static_cast<std::uint32_t>(actions_.size()) - first_action;
 }
 
+int BeliefGraph::ActionOf(BeliefId b, const GuardedMove& move) {
+  int action = -1;
+  int index = 0;
+  int cells = 0;
+  for (const BeliefAction& listed : Actions(b)) {
+    if (listed.direction == move.direction && listed.cells <= move.cells && listed.cells > cells) {
+      action = index;
+      cells = listed.cells;
+    }
+    ++index;
+  }
+  return action;
+}
+
 std::vector<BeliefOutcome> BeliefGraph::Outcomes(BeliefId b, const GuardedMove& move) {
   std::vector<BeliefOutcome> outcomes;
   const Cell robot_here = robot(b);

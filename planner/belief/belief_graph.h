@@ -65,6 +65,9 @@ class BeliefGraph {
     if (!expanded(b)) Expand(b);
     return {actions_.data() + beliefs_[b].first_action, beliefs_[b].action_count};
   }
+  /// The action that a move comes to: an index into Actions. The longest listed one in its direction that is no longer
+  /// than it, since what is blocked before returns the same; -1 if there is none.
+  int ActionOf(BeliefId b, const GuardedMove& move);
   /// Calls f(successor) for each outcome that is not a goal.
   template <class F>
   void ForEachSuccessor(const BeliefAction& action, F f) const {

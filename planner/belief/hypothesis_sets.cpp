@@ -45,11 +45,10 @@ HypothesisSets::HypothesisSets(const Problem& problem, bool canonical)
     : goal_(problem.goal), insertable_spread_(problem.insertable_spread) {
   int orientations = 1;
   double total = 0.0;
-  bool uniform = true;
+  const bool uniform = EquallyLikely(problem);
   for (const Hypothesis& h : problem.hypotheses) {
     orientations = std::max(orientations, h.orientation + 1);
     total += h.weight;
-    uniform = uniform && h.weight == problem.hypotheses.front().weight;
   }
   const CellBox hull = HullOf(problem.hypotheses);
   const Cell low = hull.min;

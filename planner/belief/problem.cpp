@@ -85,6 +85,11 @@ void Validate(const Problem& problem) {
   ValidateHypotheses(problem);
 }
 
+bool EquallyLikely(const Problem& problem) {
+  return std::ranges::all_of(problem.hypotheses,
+                             [&](const Hypothesis& h) { return h.weight == problem.hypotheses.front().weight; });
+}
+
 Outcome Simulate(const Problem& problem, const Cell& r, const GuardedMove& move, const Hypothesis& h) {
   Cell displacement = r - h.offset;
   const Cell step = UnitCell(move.direction);

@@ -46,6 +46,9 @@ struct Problem {
 /// hypothesis.
 void Validate(const Problem& problem);
 
+/// True if all hypotheses have the same weight.
+bool EquallyLikely(const Problem& problem);
+
 /// True if the tool at cell `r` overlaps the target under `h`.
 inline bool Blocked(const Problem& problem, const Cell& r, const Hypothesis& h) {
   return problem.map->Blocked(r - h.offset, h.orientation);

@@ -23,7 +23,8 @@ namespace feeler::planner {
 /// takes long. Same interface as RtdpBel, so that BoundedSearch can start from either.
 ///
 /// It may be run again with another judgement of what walks and splits cost (a lower bound makes early splits that
-/// leave much to do look cheap): of each belief the best policy found in any run is kept.
+/// leave much to do look cheap), or take a policy that was found elsewhere for one of its runs: of each belief the best
+/// policy of any run is kept.
 template <BeliefModel Model>
 class GreedyCompletion {
  public:
@@ -64,19 +65,27 @@ class GreedyCompletion {
         if (const auto why = MakePlan(b, stop, judgement)) return why;
       }
       const Plan& plan = plans_.at(b);
-      bool ready = true;
-      model_.ForEachSuccessor(model_.Actions(plan.path.back().first)[static_cast<std::size_t>(plan.path.back().second)],
-                              [&](Belief next) {
-                                if (Settled(next)) return;
-                                ready = false;
-                                open.push_back(next);
-                              });
-      if (!ready) continue;
+      if (!SuccessorsSettled(plan.path.back().first, plan.path.back().second, open)) continue;
       for (auto step = plan.path.rbegin(); step != plan.path.rend(); ++step) Settle(step->first, step->second);
       plans_.erase(b);
       open.pop_back();
     }
     return std::nullopt;
+  }
+
+  /// Takes a given policy from `start`, acyclic, as one of the runs: `action_of(b)` at each belief that it reaches.
+  template <class ActionOf>
+  void Take(Belief start, ActionOf action_of) {
+    ++run_;
+    std::vector<Belief> open = {start};
+    while (!open.empty()) {
+      const Belief b = open.back();
+      if (!model_.expanded(b)) ++expansions_;
+      const int action = action_of(b);
+      if (!Settled(b) && !SuccessorsSettled(b, action, open)) continue;
+      Settle(b, action);
+      open.pop_back();
+    }
   }
 
   bool Solved(Belief b) const { return b < nodes_.size() && nodes_[b].action >= 0; }
@@ -114,6 +123,17 @@ class GreedyCompletion {
     if (node.action >= 0 && node.value <= value) return;
     node.value = value;
     node.action = action;
+  }
+
+  /// Puts those that are not on the list.
+  bool SuccessorsSettled(Belief b, int action, std::vector<Belief>& open) {
+    bool settled = true;
+    model_.ForEachSuccessor(model_.Actions(b)[static_cast<std::size_t>(action)], [&](Belief next) {
+      if (Settled(next)) return;
+      settled = false;
+      open.push_back(next);
+    });
+    return settled;
   }
 
   bool Settled(Belief b) const { return b < nodes_.size() && nodes_[b].run == run_; }

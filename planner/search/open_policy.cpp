@@ -65,24 +65,9 @@ double OpenPolicy::FilledValue(BeliefId b) {
   return filled_policy_.Solved(*there) ? filled_policy_.Value(*there) : kInfinity;
 }
 
-int OpenPolicy::ActionOf(BeliefId b, const GuardedMove& move) {
-  if (!graph_.expanded(b)) ++expansions_;
-  int action = -1;
-  int index = 0;
-  int cells = 0;
-  // The longest in this direction that is no longer: what is blocked before returns the same.
-  for (const BeliefAction& listed : graph_.Actions(b)) {
-    if (listed.direction == move.direction && listed.cells <= move.cells && listed.cells > cells) {
-      action = index;
-      cells = listed.cells;
-    }
-    ++index;
-  }
-  return action;
-}
-
 double OpenPolicy::Record(BeliefId b, const GuardedMove& move, const std::vector<BeliefOutcome>& outcomes) {
-  const int action = ActionOf(b, move);
+  if (!graph_.expanded(b)) ++expansions_;
+  const int action = graph_.ActionOf(b, move);
   if (action < 0) return kInfinity;
   double value = 0.0;
   for (const BeliefOutcome& outcome : outcomes) {

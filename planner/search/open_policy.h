@@ -96,7 +96,6 @@ class OpenPolicy {
   GuardedMove WithLooks(BeliefId b, const GuardedMove& move, double value) const;
   /// Records the move at the belief if its value, with those of its outcomes, is less than what is known.
   double Record(BeliefId b, const GuardedMove& move, const std::vector<BeliefOutcome>& outcomes);
-  int ActionOf(BeliefId b, const GuardedMove& move);
 
   BeliefGraph& graph_;
   BeliefGraph& filled_;

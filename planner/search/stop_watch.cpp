@@ -12,11 +12,12 @@ double StopWatch::wall_s() const {
 }
 
 std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
-  if (expansions_before_ + expansions >= options_.expansion_limit) return SolverStatus::kExpansionLimit;
+  const double most = share_ * static_cast<double>(options_.expansion_limit);
+  if (static_cast<double>(expansions_before_ + expansions) >= most) return SolverStatus::kExpansionLimit;
   if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
   if ((++calls_ & 63) != 0) return std::nullopt;
-  if (wall_s() >= options_.time_limit_s) return SolverStatus::kTimeLimit;
-  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= options_.cpu_limit_s) return SolverStatus::kTimeLimit;
+  if (wall_s() >= share_ * options_.time_limit_s) return SolverStatus::kTimeLimit;
+  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= share_ * options_.cpu_limit_s) return SolverStatus::kTimeLimit;
   return std::nullopt;
 }
 

@@ -20,6 +20,9 @@ class StopWatch {
   /// Why to stop now; empty to go on. `expansions` of the attempt in work: those of earlier ones are added. Reads the
   /// clock only now and then.
   std::optional<SolverStatus> Stop(std::int64_t expansions);
+  /// From now on limits hold at this share of what they are, in (0, 1]: for an attempt that must leave some to the
+  /// next.
+  void LimitTo(double share) { share_ = share; }
   /// An attempt is over, another may follow.
   void EndAttempt(std::int64_t expansions) { expansions_before_ += expansions; }
   std::int64_t expansions_before() const { return expansions_before_; }
@@ -31,6 +34,7 @@ class StopWatch {
   std::chrono::steady_clock::time_point start_;
   double cpu_start_s_ = 0.0;
   double next_row_s_ = 0.0;
+  double share_ = 1.0;
   std::int64_t expansions_before_ = 0;
   int calls_ = 0;
 };
