@@ -7,7 +7,7 @@
 
 #include "feeler/core/worker_pool.h"
 #include "feeler/evaluation/harness/cell_store.h"
-#include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/slot_lattice.h"
 #include "feeler/planner/noise/carry_out.h"
 #include "feeler/planner/noise/solve_noisy.h"
 #include "feeler/planner/solve.h"
@@ -25,23 +25,6 @@ planner::Noise NoiseOf(int kind, double level) {
   planner::Noise noise;
   (kind == 0 ? noise.missed_contact : kind == 1 ? noise.false_stop : noise.slip) = level;
   return noise;
-}
-
-/// A wall with a slot, four places along and four across: 16 hypotheses.
-planner::Problem SlotProblem() {
-  planner::LatticeProblemData data;
-  data.name = "slot";
-  data.size = Cell(16, 10, 1);
-  data.start = Cell(1, 8, 0);
-  data.tool = {Cell::Zero()};
-  for (int x = 3; x <= 9; ++x) {
-    data.target.emplace_back(x, 1, 0);
-    if (x != 6) data.target.emplace_back(x, 2, 0);
-  }
-  for (int x = 0; x < 4; ++x) {
-    for (int y = 0; y < 4; ++y) data.hypotheses.push_back({Cell(x, y, 0), 0, 1.0});
-  }
-  return planner::MakeLatticeProblem(data);
 }
 
 struct Measured {
@@ -174,7 +157,7 @@ ExperimentResult RunNoisePriceOn(const std::vector<NamedProblem>& problems, cons
 
 ExperimentResult RunNoisePrice(const ExperimentRequest& request) {
   NoisePriceProtocol protocol;
-  std::vector<NamedProblem> problems = {{"slot", SlotProblem()}};
+  std::vector<NamedProblem> problems = {{"slot", planner::MakeLatticeProblem(planner::WallWithSlot(4, 4))}};
   const PlanningCase plug = LoadPlanningCase("plug", false, request);
   std::vector<std::string> extents = {"3x3x3", "5x5x5", "7x7x7"};
   if (request.quick) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "feeler/planner/belief/lattice_problem.h"
+#include "feeler/planner/belief/slot_lattice.h"
 
 namespace feeler::planner {
 
@@ -15,21 +16,6 @@ inline void Spread(const Cell& extents, LatticeProblemData& data) {
     }
   }
   data.move_lengths = {1, 2, 4, 8, 16};
-}
-
-/// A wall with a slot of one cell, in the plane.
-inline LatticeProblemData WallWithSlot(int along, int across) {
-  LatticeProblemData data;
-  data.name = "wall with a slot";
-  data.size = Cell(16, 10, 1);
-  data.start = Cell(1, 8, 0);
-  data.tool = {Cell::Zero()};
-  for (int x = 3; x <= 9; ++x) {
-    data.target.emplace_back(x, 1, 0);
-    if (x != 6) data.target.emplace_back(x, 2, 0);
-  }
-  Spread({along, across, 1}, data);
-  return data;
 }
 
 /// A block of height 3 on the cells 2 to 1 + `wide`, without the cells of `hole` above the lowest layer.
