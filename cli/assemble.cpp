@@ -12,6 +12,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/file_output.h"
@@ -176,7 +177,10 @@ void Run(const CLI::App& command, const AssembleFlags& flags, Session& session) 
   }
   if (session.ranks != nullptr) session.ranks->Assemble(RankIdentity(flags));
   std::optional<OutputFile> out;
-  if (!flags.out.empty()) out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+  if (!flags.out.empty()) {
+    out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+    KeepsWhatIsDone();
+  }
   workflow::AssemblyFilm film;
   film.period_s = flags.video_speed / 25.0;
   if (!flags.video.empty()) options.film = &film;

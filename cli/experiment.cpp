@@ -11,6 +11,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
 #include "feeler/core/parallelism.h"
@@ -81,6 +82,7 @@ void Run(const CLI::App& command, const ExperimentFlags& flags, Session& session
   request.map_progress = Interruptible(map_bar, session);
   request.database_progress = database_bar.Callback();
   request.progress = bar.Callback();
+  KeepsWhatIsDone();
   const evaluation::ExperimentOutcome outcome =
       session.ranks != nullptr ? evaluation::RunExperimentOnRanks(experiment, request, *session.ranks)
                                : evaluation::RunExperiment(experiment, request);

@@ -14,6 +14,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/perceived_target.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
@@ -136,6 +137,7 @@ void Calibrate(const CLI::App& command, const CalibrateFlags& flags, Session& se
   } else if (IsReplaceable(flags.out)) {
     options.partial = flags.out + ".partial.jsonl";
   }
+  if (!options.partial.empty()) KeepsWhatIsDone();
   options.cancellation = session.cancellation;
   options.Validate();
   std::vector<std::string> inputs = InputsOfTask(flags.task);

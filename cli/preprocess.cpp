@@ -10,6 +10,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/db_summary.h"
 #include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
@@ -213,6 +214,7 @@ void Run(const CLI::App& command, const PreprocessFlags& flags, Session& session
     options.only = std::make_shared<const std::vector<planner::Extents>>(workflow::ProblemsOfShard(family, *shard));
     part = workflow::DatabaseShardOf(family, *shard);
   }
+  KeepsWhatIsDone();
   const workflow::DatabaseBuild build = workflow::BuildDatabase(setup, family, options, flags.out, part);
   bar.Finish();
 

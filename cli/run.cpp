@@ -17,6 +17,7 @@
 #include "feeler/cli/common/numbers.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/progress_bar.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/quick_check.h"
 #include "feeler/cli/solver_flags.h"
 #include "feeler/core/error.h"
@@ -230,6 +231,7 @@ void Run(const CLI::App& command, const RunFlags& flags, Session& session) {
   std::optional<OutputFile> out;
   if (!flags.out.empty()) {
     out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+    KeepsWhatIsDone();
     if (!out->direct()) {  // a pipe has no folder
       const std::string folder = std::filesystem::path(flags.out).parent_path().string();
       RequireOutputs({{"--out", evaluation::SceneFile(folder, setup->task().name), FileKind::kScene}}, Inputs(flags));

@@ -127,7 +127,7 @@ int Run(CLI::App& app, const Session& session, int argc, char** argv) {
     return Fail(InputError("command line", e.what(), "see feeler --help").what(), 2);
   } catch (...) {
     if (session.cancellation == nullptr || !session.cancellation->cancelled()) return Explain();
-    Tell("feeler: interrupted: what was done is kept\n");
+    Tell(std::string(InterruptedMessage()));
     return 1;
   }
 }

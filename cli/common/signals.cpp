@@ -18,15 +18,16 @@ constexpr long kGraceNanoseconds = 1'500'000'000;
 std::atomic<CancellationToken*> token{nullptr};
 std::atomic<int> signals_seen{0};
 std::atomic<bool> silent{false};
+std::atomic<bool> keeps{false};
 timer_t grace_timer;
 bool has_timer = false;
 
 /// What a handler may do: no locks, no memory.
 [[noreturn]] void EndNow() {
   SettleOutputsInSignalHandler();
-  constexpr std::string_view kMessage = "feeler: interrupted: what was done is kept\n";
   if (silent.load()) _exit(1);
-  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kMessage.data(), kMessage.size());
+  const std::string_view message = InterruptedMessage();
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, message.data(), message.size());
   _exit(1);
 }
 
@@ -61,6 +62,13 @@ void Handle(int number, void (*handler)(int)) {
 }  // namespace
 
 void EndSilently() { silent = true; }
+
+void KeepsWhatIsDone() { keeps = true; }
+
+std::string_view InterruptedMessage() {
+  return keeps.load() ? "feeler: interrupted: what was done is kept\n"
+                      : "feeler: interrupted: nothing was begun that could be kept\n";
+}
 
 void CancelOnSignals(CancellationToken& cancellation) {
   token = &cancellation;

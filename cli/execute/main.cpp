@@ -11,6 +11,7 @@
 #include "feeler/cli/common/console.h"
 #include "feeler/cli/common/outputs.h"
 #include "feeler/cli/common/program.h"
+#include "feeler/cli/common/signals.h"
 #include "feeler/cli/execute/executing.h"
 #include "feeler/cli/execute/flags.h"
 #include "feeler/core/file_output.h"
@@ -85,7 +86,10 @@ void Run(const ExecuteFlags& flags, Session& session) {
   if (!flags.box.empty()) ParseBox("--box", flags.box);
   Executing executing(flags, session);
   std::optional<OutputFile> out;
-  if (!flags.out.empty()) out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+  if (!flags.out.empty()) {
+    out.emplace(flags.out, OutputFile::WhenInterrupted::kKeep);
+    KeepsWhatIsDone();
+  }
   executing.Start();
   Tally tally;
   const double wall_start_s = execution::MonotonicSeconds();
