@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <type_traits>
 
 #include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/planner/search/bounded_search.h"
@@ -71,18 +72,23 @@ bool Complete(SolveRun& run, Greedy& greedy) {
   return false;
 }
 
-/// Further policies while the gap is open, with up to half of the budget: with orientations the first may be far off.
-void Improve(SolveRun& run, Greedy& greedy) {
-  const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
-    if (run.watch.expansions_before() + expansions >= run.options.expansion_limit / 2) {
-      return SolverStatus::kExpansionLimit;
-    }
-    return run.Stop(expansions, greedy.bytes());
-  };
+/// With orientations both the first policy and the bound at the start may be far off: further policies and the search
+/// go by turns, each with as many expansions as the other, until the gap is closed or `stop` says why not to go on.
+template <class Search, class Stop>
+std::optional<SolverStatus> CloseGapByTurns(SolveRun& run, Greedy& greedy, Search& search, Stop stop) {
   for (std::uint64_t number = 0; number < kFurtherPolicies; ++number) {
-    if (greedy.Value(run.start) <= run.options.gap * run.result.lower_bound * run.weight) return;
-    if (greedy.Run(run.start, stop, RandomJudgement(run.graph, run.options.seed, number))) return;
+    const auto judgement = RandomJudgement(run.graph, run.options.seed, number);
+    const auto stop_greedy = [&](std::int64_t) { return stop(search.expansions()); };
+    if (const auto why = greedy.Run(run.start, stop_greedy, judgement)) return why;
+    const std::int64_t turn = 2 * greedy.expansions();
+    std::optional<SolverStatus> why;
+    const auto over = search.Run(run.start, [&](std::int64_t expansions) {
+      why = stop(expansions);
+      return !why && expansions >= turn ? SolverStatus::kExpansionLimit : why;
+    });
+    if (why || !over) return why;
   }
+  return search.Run(run.start, stop);
 }
 
 /// From the incumbent's policy until cost and lower bound meet within the gap.
@@ -91,12 +97,18 @@ void CloseGap(SolveRun& run, Incumbent& incumbent) {
   SolverResult& result = run.result;
   BoundedSearch search(run.graph, incumbent, run.options.gap, Oriented(run) ? kGuessInflation : 1.0);
   const auto lower = [&] { return std::max(result.lower_bound, search.Lower(run.start) / run.weight); };
-  const auto why = search.Run(run.start, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+  const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
     const double upper = search.Upper(run.start) / run.weight;
     if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
     if (upper <= run.options.gap * lower()) return SolverStatus::kGap;
     return run.Stop(expansions, search.bytes() + incumbent.bytes());
-  });
+  };
+  std::optional<SolverStatus> why;
+  if constexpr (std::is_same_v<Incumbent, Greedy>) {
+    why = Oriented(run) ? CloseGapByTurns(run, incumbent, search, stop) : search.Run(run.start, stop);
+  } else {
+    why = search.Run(run.start, stop);
+  }
   result.lower_bound = lower();
   result.trials = search.trials();
   result.expansions = search.expansions();
@@ -147,7 +159,6 @@ void SolveCertified(SolveRun& run) {
   TakeKnown(run, greedy);
   if (const std::optional<Problem> filled = WithoutDeadEnds(run)) return SolveWithOpenings(run, *filled, greedy);
   if (!Complete(run, greedy)) return;
-  if (Oriented(run)) Improve(run, greedy);
   CloseGap(run, greedy);
 }
 

@@ -15,9 +15,10 @@ namespace feeler::planner {
 /// Simmons 2004).
 ///
 /// L(b) <= V*(b): starts at the heuristic and is raised by Bellman updates, which keep it below V*. U(b) >= V*(b): the
-/// cost of a complete policy from b, infinite while none is known. It starts at the incumbent (a policy found before),
-/// and Bellman updates over actions whose successors all have a U lower it. The action is recorded with each
-/// improvement. Following recorded actions never cycles: along them U falls by at least the cost of the move.
+/// cost of a complete policy from b, infinite while none is known. It starts at the incumbent (a policy found before,
+/// which may become better between two runs), and Bellman updates over actions whose successors all have a U lower it.
+/// The action is recorded with each improvement. Following recorded actions never cycles: along them U falls by at
+/// least the cost of the move.
 ///
 /// A trial follows the action of least L, then the successor of the widest gap, and ends where U <= gap L: if that
 /// holds for all successors of an action it holds for the belief, so nothing below needs work. The search is done when
@@ -57,9 +58,11 @@ class BoundedSearch {
   double Lower(Belief b) { return Node(b).lower; }
   double Upper(Belief b) { return std::min(Node(b).upper, incumbent_.Solved(b) ? incumbent_.Value(b) : kInfinity); }
   /// The action of the best policy found: an index into Model::Actions.
-  int Action(Belief b) { return Node(b).action >= 0 ? Node(b).action : incumbent_.Action(b); }
+  int Action(Belief b) { return Improved(b) ? Node(b).action : incumbent_.Action(b); }
   /// False where the best policy found is the incumbent's.
-  bool Improved(Belief b) { return Node(b).action >= 0; }
+  bool Improved(Belief b) {
+    return Node(b).action >= 0 && !(incumbent_.Solved(b) && incumbent_.Value(b) < Node(b).upper);
+  }
   std::int64_t trials() const { return trials_; }
   /// Of its own, without the model's and the incumbent's.
   std::size_t bytes() const { return nodes_.capacity() * sizeof(State); }
