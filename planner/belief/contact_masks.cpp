@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "feeler/planner/arrays/row_dictionary.h"
+
 namespace feeler::planner {
 namespace {
 
@@ -39,25 +41,25 @@ ContactMasks::ContactMasks(const ContactMap& map, const ArrayStore* store) {
   // its corner.
   domain_ = {map.domain().min - Cell::Ones(), map.domain().max + Cell(kMaskWindow, kMaskWindow, 1)};
   size_ = domain_.Size();
-  stride_ = static_cast<std::size_t>(domain_.Count());
-  if (store != nullptr && store->Take<std::uint32_t>("mask indices", {&index_}) &&
+  if (store != nullptr && store->Take<std::uint32_t>("mask indices", {&row_, &index_}) &&
       store->Take<Bits256>("masks", {&masks_})) {
     return;
   }
   Fill(map);
   if (store == nullptr) return;
-  store->Keep<std::uint32_t>("mask indices", {&index_});
+  store->Keep<std::uint32_t>("mask indices", {&row_, &index_});
   store->Keep<Bits256>("masks", {&masks_});
 }
 
 void ContactMasks::Fill(const ContactMap& map) {
-  std::vector<std::uint32_t> index(stride_ * kDirectionCount * static_cast<std::size_t>(map.orientations()), 0);
+  std::vector<std::uint32_t> rows;
+  RowDictionary<std::uint32_t> index(static_cast<std::size_t>(size_.x()));
+  std::vector<std::uint32_t> of_row(static_cast<std::size_t>(size_.x()));
   std::vector<Bits256> masks(1);
   std::unordered_map<Bits256, std::uint32_t, HashBits> known = {{Bits256{}, 0}};
   const CellBox sampled = {domain_.min, map.domain().max + Cell::Ones()};
   for (int o = 0; o < map.orientations(); ++o) {
     for (const Direction d : kDirections) {
-      std::uint32_t* const plane = &index[static_cast<std::size_t>(o * kDirectionCount + IndexOf(d)) * stride_];
       for (int z = 0; z < size_.z(); ++z) {
         std::vector<Bits256> column(static_cast<std::size_t>(size_.x()));
         for (int y = 1 - kMaskWindow; y < size_.y(); ++y) {
@@ -73,16 +75,18 @@ void ContactMasks::Fill(const ContactMap& map) {
             Bits256& mask = column[static_cast<std::size_t>(x)];
             mask = mask.Up(kMaskWindow);
             mask.word[0] |= row;
-            if (y < 0 || !mask.Any()) continue;
+            if (y < 0) continue;
             const auto [at, added] = known.try_emplace(mask, static_cast<std::uint32_t>(masks.size()));
             if (added) masks.push_back(mask);
-            plane[static_cast<std::size_t>((z * size_.y() + y) * size_.x() + x)] = at->second;
+            of_row[static_cast<std::size_t>(x)] = at->second;
           }
+          if (y >= 0) rows.push_back(index.Add(of_row));
         }
       }
     }
   }
-  index_ = std::move(index);
+  row_ = std::move(rows);
+  index_ = index.Release();
   masks_ = std::move(masks);
 }
 

@@ -14,8 +14,9 @@
 namespace feeler::planner {
 
 /// The contact map turned round: for the tool at one place, which of a 16 x 16 window of hypotheses block its next
-/// step. Splitting a belief by a step is then a handful of word operations. Masks repeat, so each distinct one is
-/// stored once and looked up by index; index 0 is the empty mask. Immutable; safe to read from many threads.
+/// step. Splitting a belief by a step is then a handful of word operations. Masks repeat, and so do rows of them along
+/// x: each distinct one is stored once and looked up by index; index 0 is the empty mask. Immutable; safe to read from
+/// many threads.
 class ContactMasks {
  public:
   /// From the store, or made and kept there; its key stands for the map.
@@ -26,20 +27,21 @@ class ContactMasks {
   /// motion can reach (inside the target) are left out of the masks.
   std::uint32_t Index(const Cell& corner, Direction d, int orientation) const {
     const Cell c = domain_.Clamp(corner) - domain_.min;
-    const std::size_t plane = static_cast<std::size_t>(orientation * kDirectionCount + IndexOf(d)) * stride_;
-    return index_[plane + static_cast<std::size_t>((c.z() * size_.y() + c.y()) * size_.x() + c.x())];
+    const int plane = orientation * kDirectionCount + IndexOf(d);
+    return index_[row_[static_cast<std::size_t>((plane * size_.z() + c.z()) * size_.y() + c.y())] +
+                  static_cast<std::size_t>(c.x())];
   }
   const Bits256& Mask(std::uint32_t index) const { return masks_[index]; }
   std::size_t distinct() const { return masks_.size(); }
-  std::size_t bytes() const { return index_.bytes() + masks_.bytes(); }
+  std::size_t bytes() const { return row_.bytes() + index_.bytes() + masks_.bytes(); }
 
  private:
   void Fill(const ContactMap& map);
 
   CellBox domain_;  ///< of window corners; beyond it masks repeat
   Cell size_;
-  std::size_t stride_ = 0;
-  SharedArray<std::uint32_t> index_;
+  SharedArray<std::uint32_t> row_;    ///< where a row of window corners begins in index_
+  SharedArray<std::uint32_t> index_;  ///< of masks, row after row
   SharedArray<Bits256> masks_;
 };
 

@@ -45,7 +45,7 @@ class WeakenedHeuristic : public BeliefHeuristic {
 };
 
 /// Changes when tables of the same problem come out otherwise.
-constexpr int kTablesVersion = 1;
+constexpr int kTablesVersion = 2;
 
 std::string HashOf(const ContactMap& map) {
   const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);

@@ -1,5 +1,6 @@
 #include "feeler/planner/contact/step_flags_grid.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -74,6 +75,20 @@ StepFlagsGrid::Region StepFlagsGrid::Union(const Region& a, const Region& b) {
     both.free_below[i] = a.free_below[i] && b.free_below[i];
   }
   return both;
+}
+
+void StepFlagsGrid::Copy(const CellBox& box, int orientation, std::span<std::uint8_t> flags) const {
+  const SharedArray<std::uint8_t>& grid = flags_[static_cast<std::size_t>(orientation)];
+  auto to = flags.begin();
+  for (int z = box.min.z(); z <= box.max.z(); ++z) {
+    for (int y = box.min.y(); y <= box.max.y(); ++y) {
+      const Cell first = domain_.Clamp(Cell(domain_.min.x(), y, z)) - domain_.min;
+      const std::uint8_t* const row = grid.data() + GridIndex(size_, first);
+      for (int x = box.min.x(); x <= box.max.x(); ++x, ++to) {
+        *to = row[std::clamp(x, domain_.min.x(), domain_.max.x()) - domain_.min.x()];
+      }
+    }
+  }
 }
 
 }  // namespace feeler::planner

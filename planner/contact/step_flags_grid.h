@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "feeler/core/lattice_grid.h"
@@ -25,6 +26,9 @@ class StepFlagsGrid {
   std::uint8_t At(const Cell& displacement, int orientation) const {
     return flags_[static_cast<std::size_t>(orientation)][GridIndex(size_, domain_.Clamp(displacement) - domain_.min)];
   }
+
+  /// Those of all displacements of a box, x fastest, into an array of as many.
+  void Copy(const CellBox& box, int orientation, std::span<std::uint8_t> flags) const;
 
   struct Region {
     CellBox box;  ///< beyond it the flags repeat those of its outermost layers

@@ -106,7 +106,6 @@ class LaneSweeper {
   }
 
   std::uint8_t At(std::size_t cell, std::size_t lane) const { return values_[cell * lanes_ + lane]; }
-  const std::vector<std::uint8_t>& values() const { return values_; }
 
  private:
   bool SweepRow(int y, int z, bool backward) {
@@ -247,6 +246,7 @@ OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFla
   for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
   std::vector<int> orientations;
   std::vector<SharedArray<std::uint8_t>*> values;
+  std::vector<SharedArray<std::uint32_t>*> cells;
   const int rows = flags.orientations() / problem.pitches;
   for (int o = 0; o < flags.orientations(); ++o) {
     if (used[static_cast<std::size_t>(o)] == 0) continue;
@@ -270,14 +270,20 @@ OrientedCertificates::OrientedCertificates(const Problem& problem, const StepFla
     }
     layer.lanes = 1 << bits;
     layer.box = OrientedBox(region, reach);
-    values.push_back(&layer.values);
+    values.push_back(layer.values.differences());
+    cells.push_back(layer.values.cells());
   }
-  if (store != nullptr && store->Take("oriented certificates", values)) return;
+  if (store != nullptr && store->Take("oriented certificates", values) &&
+      store->Take("cells of oriented certificates", cells)) {
+    return;
+  }
   const int contact_units = static_cast<int>(std::min(60.0, std::floor(costs.contact / costs.free + 1e-9)));
   const bool all = ParallelFor(
       orientations.size(), jobs, [&](std::size_t k) { Fill(flags, orientations[k], contact_units); }, progress,
       cancellation);
-  if (all && store != nullptr) store->Keep("oriented certificates", values);
+  if (!all || store == nullptr) return;
+  store->Keep("oriented certificates", values);
+  store->Keep("cells of oriented certificates", cells);
 }
 
 void OrientedCertificates::Fill(const StepFlagsGrid& flags, int orientation, int contact_units) {
@@ -301,32 +307,26 @@ void OrientedCertificates::Fill(const StepFlagsGrid& flags, int orientation, int
                     return told;
                   });
   sweeper.Run();
-  const std::size_t cells = layer.box.cells;
-  const auto lanes = static_cast<std::size_t>(layer.lanes);
-  std::vector<std::uint8_t> values(cells * lanes);
-  constexpr std::size_t kBlock = 64;  // cells at a time, for the cache
-  for (std::size_t begin = 0; begin < cells; begin += kBlock) {
-    const std::size_t end = std::min(cells, begin + kBlock);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      std::uint8_t* const plane = &values[lane * cells];
-      for (std::size_t cell = begin; cell < end; ++cell) plane[cell] = sweeper.At(cell, lane);
-    }
-  }
-  layer.values = std::move(values);
+  std::vector<std::uint8_t> times(static_cast<std::size_t>(layer.lanes), 1);
+  times[0] = 0;  // no neighbour, no cost
+  layer.values =
+      DifferenceRows<std::uint8_t>(layer.box.cells, times, [&](std::size_t cell, std::span<std::uint8_t> values) {
+        for (std::size_t lane = 0; lane < values.size(); ++lane) values[lane] = sweeper.At(cell, lane);
+      });
 }
 
-const std::uint8_t* OrientedCertificates::Plane(int orientation, unsigned subset) const {
+OrientedCertificates::Plane OrientedCertificates::PlaneOf(int orientation, unsigned subset) const {
   const Layer& layer = layers_[static_cast<std::size_t>(orientation)];
   std::size_t lane = 0;
   for (std::size_t i = 0; i < neighbours_.size(); ++i) {
     if ((subset >> i & 1) != 0) lane |= std::size_t{1} << layer.lane_bit[i];
   }
-  return layer.values.data() + lane * layer.box.cells;
+  return layer.values.Of(lane, static_cast<std::size_t>(layer.lanes), lane == 0 ? 0 : 1);
 }
 
 std::size_t OrientedCertificates::bytes() const {
   std::size_t sum = 0;
-  for (const Layer& layer : layers_) sum += layer.values.size();
+  for (const Layer& layer : layers_) sum += layer.values.bytes();
   return sum;
 }
 

@@ -12,6 +12,7 @@
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
+#include "feeler/planner/bounds/orientations/difference_rows.h"
 #include "feeler/planner/contact/step_flags_grid.h"
 
 namespace feeler::planner {
@@ -72,8 +73,9 @@ class OrientedCertificates {
            layers_[static_cast<std::size_t>(orientation)].lanes > 0;
   }
   const OrientedBox& box(int orientation) const { return layers_[static_cast<std::size_t>(orientation)].box; }
+  using Plane = DifferenceRows<std::uint8_t>::Lane;
   /// The values of a subset of neighbours (all of them tabled), by box(orientation).Index.
-  const std::uint8_t* Plane(int orientation, unsigned subset) const;
+  Plane PlaneOf(int orientation, unsigned subset) const;
   std::size_t bytes() const;
 
  private:
@@ -82,7 +84,7 @@ class OrientedCertificates {
     int lanes = 0;
     std::array<int, kMostNeighbours> neighbour{};  ///< orientations, -1: none
     std::array<int, kMostNeighbours> lane_bit{};   ///< of a neighbour, -1: none
-    SharedArray<std::uint8_t> values;              ///< plane after plane
+    DifferenceRows<std::uint8_t> values;
   };
   void Fill(const StepFlagsGrid& flags, int orientation, int contact_units);
 

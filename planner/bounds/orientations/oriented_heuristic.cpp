@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
-#include <map>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
+#include "feeler/core/lattice_grid.h"
 #include "feeler/planner/belief/neighbour_masks.h"
 
 namespace feeler::planner {
@@ -87,47 +86,73 @@ const OrientedPairs::Plane& OrientedHeuristic::PairPlane(const Member& one, cons
 }
 
 /// Members that share a place, by place; within it by the lines that they are on.
-void OrientedHeuristic::FindGroups(Terms& terms) {
+void OrientedHeuristic::FindGroups(SetId set, Terms& terms) {
+  const HypothesisSets::Info& info = sets_.info(set);
+  const Cell size = info.high - info.low + Cell::Ones();
+  const auto place_of = [&](const Member& member) { return GridIndex(size, member.offset - info.low); };
+  // By place; within it they stay in order.
+  std::vector<std::uint32_t> ends(static_cast<std::size_t>(size.prod()) + 1, 0);
+  for (const Member& member : members_) ++ends[place_of(member) + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
   std::vector<std::uint32_t> order(members_.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const auto place_of = [&](std::uint32_t i) {
-    const Cell& c = members_[i].offset;
-    return std::make_tuple(c.z(), c.y(), c.x());
-  };
-  std::ranges::stable_sort(order, {}, place_of);  // members come by orientation
+  for (std::uint32_t i = 0; i < members_.size(); ++i) order[ends[place_of(members_[i])]++] = i;
   terms.first_place = static_cast<std::uint32_t>(places_.size());
-  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
-    while (end < order.size() && place_of(order[end]) == place_of(order[begin])) ++end;
+  std::size_t begin = 0;
+  for (const std::uint32_t end : ends) {
+    if (end <= begin) continue;
     Place place{members_[order[begin]].offset, static_cast<std::uint32_t>(groups_.size()), {}};
     for (const OrientedLines::Axis axis : {OrientedLines::kYaw, OrientedLines::kPitch}) {
-      std::map<int, std::vector<std::uint32_t>> on_line;
+      on_line_.clear();
       for (std::size_t k = begin; k < end; ++k) {
         const int orientation = members_[order[k]].orientation;
         const int line = lines_->PlaceOf(axis, orientation).line;
-        on_line[line < 0 ? -1 - orientation : line].push_back(order[k]);
+        on_line_.emplace_back(line < 0 ? -1 - orientation : line, order[k]);
       }
-      for (const auto& [line, members] : on_line) {
-        Group group{nullptr, nullptr, static_cast<std::uint32_t>(grouped_.size()),
-                    static_cast<std::uint32_t>(members.size())};
-        if (members.size() > 1) {
-          unsigned subset = 0;
-          for (const std::uint32_t i : members) subset |= 1U << lines_->PlaceOf(axis, members_[i].orientation).bit;
-          group.values = lines_->Plane(line, subset);
+      std::ranges::sort(on_line_);
+      for (auto next = on_line_.begin(); next != on_line_.end();) {
+        const int line = next->first;
+        Group group{{}, nullptr, static_cast<std::uint32_t>(grouped_.size()), 0};
+        unsigned subset = 0;
+        for (; next != on_line_.end() && next->first == line; ++next, ++group.count) {
+          grouped_.push_back(next->second);
+          if (line >= 0) subset |= 1U << lines_->PlaceOf(axis, members_[next->second].orientation).bit;
+        }
+        if (group.count > 1) {
+          group.values = lines_->PlaneOf(line, subset);
           group.box = &lines_->box(line);
         }
-        grouped_.insert(grouped_.end(), members.begin(), members.end());
         groups_.push_back(group);
         ++place.count[axis];
       }
     }
     places_.push_back(place);
+    begin = end;
   }
   terms.places = static_cast<std::uint32_t>(places_.size()) - terms.first_place;
+}
+
+std::size_t OrientedHeuristic::PreparedBytes() const {
+  return runs_.capacity() * sizeof(Run) + weights_.capacity() * sizeof(double) + places_.capacity() * sizeof(Place) +
+         groups_.capacity() * sizeof(Group) + grouped_.capacity() * sizeof(std::uint32_t);
+}
+
+void OrientedHeuristic::Forget() {
+  std::ranges::fill(terms_of_, Terms());
+  runs_.clear();
+  weights_.clear();
+  places_.clear();
+  groups_.clear();
+  grouped_.clear();
+  pair_planes_.clear();
 }
 
 OrientedHeuristic::Terms OrientedHeuristic::Prepare(SetId set) {
   if (set >= terms_of_.size()) terms_of_.resize(sets_.count());
   if (terms_of_[set].ready) return terms_of_[set];
+  if (runs_.size() * sizeof(Run) + groups_.size() * sizeof(Group) + grouped_.size() * sizeof(std::uint32_t) >
+      most_prepared_bytes_) {
+    Forget();
+  }
   FindMembers(set);
   Terms terms;
   terms.first = static_cast<std::uint32_t>(runs_.size());
@@ -140,23 +165,24 @@ OrientedHeuristic::Terms OrientedHeuristic::Prepare(SetId set) {
       const auto nearest = Nearest(i);
       if (!nearest) continue;
       const OrientedPairs::Plane& plane = PairPlane(member, members_[*nearest]);
-      runs_.push_back({plane.values.data(), &plane.box, member.offset, 1, index});
+      runs_.push_back({{}, plane.values.data(), &plane.box, member.offset, 1, index});
     } else if (table_ == nullptr) {
       continue;
     } else {
-      const std::uint8_t* const values = table_->Plane(member.orientation, member.neighbours);
+      const OrientedCertificates::Plane values = table_->PlaneOf(member.orientation, member.neighbours);
       Run* const last = runs_.size() > terms.first ? &runs_.back() : nullptr;
-      if (uniform_ && last != nullptr && last->values == values && member.offset == last->last + Cell(1, 0, 0)) {
+      if (uniform_ && last != nullptr && last->values.differences == values.differences &&
+          member.offset == last->last + Cell(1, 0, 0)) {
         last->last = member.offset;
         ++last->length;
         continue;
       }
-      runs_.push_back({values, &table_->box(member.orientation), member.offset, 1, index});
+      runs_.push_back({values, nullptr, &table_->box(member.orientation), member.offset, 1, index});
     }
     if (!uniform_) weights_.push_back(member.weight);
   }
   terms.count = static_cast<std::uint32_t>(runs_.size()) - terms.first;
-  if (lines_) FindGroups(terms);
+  if (lines_) FindGroups(set, terms);
   terms_of_[set] = terms;
   return terms;
 }
@@ -170,15 +196,16 @@ bool OrientedHeuristic::CostsOfMembers(const Terms& terms, const Cell& robot) {
     const CellBox& domain = run.box->domain;
     std::uint32_t* const costs = &costs_[run.member + static_cast<std::uint32_t>(run.length - 1)];
     const bool tabled = domain.Contains(displacement) && displacement.x() + run.length - 1 <= domain.max.x();
-    const std::uint8_t* const values = run.values + run.box->Index(displacement);
+    const std::size_t first = run.box->Index(displacement);
+    const auto value_at = [&](std::size_t cell) { return run.pair != nullptr ? run.pair[cell] : run.values[cell]; };
     for (int k = 0; k < run.length; ++k) {
       std::uint8_t value = 0;
       std::uint32_t way_back = 0;
       if (tabled) {
-        value = values[k];
+        value = value_at(first + static_cast<std::size_t>(k));
       } else {
         const Cell at = displacement + Cell(k, 0, 0);
-        value = run.values[run.box->Index(at)];
+        value = value_at(run.box->Index(at));
         way_back = run.box->WayBack(at);
       }
       if (value == OrientedCertificates::kNone) return false;
@@ -204,7 +231,7 @@ std::optional<std::uint64_t> OrientedHeuristic::SumOverPlaces(const Terms& terms
         std::uint32_t certificates = 0;
         for (std::uint32_t i = of.first; i < of.first + of.count; ++i) certificates += costs_[grouped_[i]];
         certificates *= units;
-        if (of.values != nullptr) {
+        if (of.values.differences != nullptr) {
           const std::uint16_t value = of.values[of.box->Index(displacement)];
           if (value == OrientedLines::kNone) return std::nullopt;
           certificates = std::max(certificates, value + of.count * units * of.box->WayBack(displacement));

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "feeler/planner/belief/belief_heuristic.h"
@@ -32,16 +33,16 @@ class OrientedHeuristic final : public BeliefHeuristic {
   /// orientation. To be added to bounds that count nothing for them.
   OrientedHeuristic(const Problem& problem, const HypothesisSets& sets, std::shared_ptr<const OrientedPairs> pairs);
   double Weighted(SetId set, const Cell& robot) override;
-  std::size_t bytes() const override {
-    return terms_of_.capacity() * sizeof(Terms) + runs_.capacity() * sizeof(Run) +
-           weights_.capacity() * sizeof(double) + places_.capacity() * sizeof(Place) +
-           groups_.capacity() * sizeof(Group) + grouped_.capacity() * sizeof(std::uint32_t);
-  }
+  /// What is prepared for sets is forgotten when it has grown to so many bytes; sets that are met again are prepared
+  /// again.
+  void LimitPrepared(std::size_t bytes) { most_prepared_bytes_ = bytes; }
+  std::size_t bytes() const override { return terms_of_.capacity() * sizeof(Terms) + PreparedBytes(); }
 
  private:
   /// Hypotheses that follow one another along x and look at the same neighbours: their values lie side by side.
   struct Run {
-    const std::uint8_t* values = nullptr;
+    OrientedCertificates::Plane values;
+    const std::uint8_t* pair = nullptr;  ///< of an isolated hypothesis, in place of values
     const OrientedBox* box = nullptr;
     Cell last = Cell::Zero();  ///< of greatest x, relative to the frame: it comes first in the table
     int length = 1;
@@ -49,7 +50,7 @@ class OrientedHeuristic final : public BeliefHeuristic {
   };
   /// Members at one place that are on one line, or one member that is on a line alone.
   struct Group {
-    const std::uint16_t* values = nullptr;  ///< null: certificates only
+    OrientedLines::Plane values;  ///< none: certificates only
     const OrientedBox* box = nullptr;
     std::uint32_t first = 0;  ///< of its members, in grouped_
     std::uint32_t count = 0;
@@ -74,8 +75,10 @@ class OrientedHeuristic final : public BeliefHeuristic {
     unsigned neighbours = 0;
   };
   Terms Prepare(SetId set);
+  std::size_t PreparedBytes() const;
+  void Forget();
   void FindMembers(SetId set);
-  void FindGroups(Terms& terms);
+  void FindGroups(SetId set, Terms& terms);
   std::optional<std::size_t> Nearest(std::size_t member) const;
   const OrientedPairs::Plane& PairPlane(const Member& one, const Member& other);
   bool CostsOfMembers(const Terms& terms, const Cell& robot);
@@ -89,6 +92,7 @@ class OrientedHeuristic final : public BeliefHeuristic {
   Cell spread_;
   int pitches_;
   bool uniform_;
+  std::size_t most_prepared_bytes_ = std::size_t{96} << 20;
   std::map<std::array<int, 5>, std::shared_ptr<const OrientedPairs::Plane>> pair_planes_;  ///< that runs point into
   std::vector<Terms> terms_of_;
   std::vector<Run> runs_;
@@ -96,7 +100,8 @@ class OrientedHeuristic final : public BeliefHeuristic {
   std::vector<Place> places_;
   std::vector<Group> groups_;
   std::vector<std::uint32_t> grouped_;
-  std::vector<Member> members_;       ///< of the set in work
+  std::vector<Member> members_;                         ///< of the set in work
+  std::vector<std::pair<int, std::uint32_t>> on_line_;  ///< members at one place by their line, in work
   std::vector<std::uint32_t> costs_;  ///< of the members, where the tool is, in units of the certificates
 };
 

@@ -29,13 +29,20 @@ OrientedLines::OrientedLines(const Problem& problem, const StepFlagsGrid& flags,
   for (const Hypothesis& h : problem.hypotheses) used[static_cast<std::size_t>(h.orientation)] = 1;
   for (const Axis axis : {kYaw, kPitch}) AddLines(axis, problem, flags, used);
   std::vector<SharedArray<std::uint16_t>*> values;
-  for (Line& line : lines_) values.push_back(&line.values);
-  if (store != nullptr && store->Take("oriented lines", values)) return;
+  std::vector<SharedArray<std::uint32_t>*> cells;
+  for (Line& line : lines_) {
+    values.push_back(line.values.differences());
+    cells.push_back(line.values.cells());
+  }
+  if (store != nullptr && store->Take("oriented lines", values) && store->Take("cells of oriented lines", cells))
+    return;
   const double contact = costs.contact / costs.free * units_per_step_;
   const auto contact_units = static_cast<std::uint32_t>(std::min(4000.0, std::floor(contact + 1e-9)));
   const bool all = ParallelFor(
       lines_.size(), jobs, [&](std::size_t i) { Fill(flags, contact_units, lines_[i]); }, progress, cancellation);
-  if (all && store != nullptr) store->Keep("oriented lines", values);
+  if (!all || store == nullptr) return;
+  store->Keep("oriented lines", values);
+  store->Keep("cells of oriented lines", cells);
 }
 
 void OrientedLines::AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags,
@@ -170,18 +177,23 @@ void OrientedLines::Fill(const StepFlagsGrid& flags, std::uint32_t contact_units
           cost[i] == kInfinite ? kNone : static_cast<std::uint16_t>(std::min<std::uint32_t>(cost[i], kNone - 1U));
     }
   }
-  line.values = std::move(values);
+  std::vector<std::uint16_t> times(subsets, 0);
+  for (const std::uint32_t s : order) times[s] = static_cast<std::uint16_t>(std::popcount(s));
+  line.values = DifferenceRows<std::uint16_t>(cells, times, [&](std::size_t cell, std::span<std::uint16_t> of_subsets) {
+    for (std::size_t subset = 0; subset < subsets; ++subset) of_subsets[subset] = values[subset * cells + cell];
+  });
 }
 
-const std::uint16_t* OrientedLines::Plane(int line, unsigned subset) const {
-  if (std::has_single_bit(subset)) return nullptr;
+OrientedLines::Plane OrientedLines::PlaneOf(int line, unsigned subset) const {
+  if (std::has_single_bit(subset)) return {};
   const Line& of = lines_[static_cast<std::size_t>(line)];
-  return &of.values[subset * of.box.cells];
+  return of.values.Of(subset, std::size_t{1} << of.orientations.size(),
+                      static_cast<std::uint16_t>(std::popcount(subset)));
 }
 
 std::size_t OrientedLines::bytes() const {
   std::size_t sum = 0;
-  for (const Line& line : lines_) sum += line.values.size() * sizeof(std::uint16_t);
+  for (const Line& line : lines_) sum += line.values.bytes();
   return sum;
 }
 

@@ -10,6 +10,7 @@
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/problem.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
+#include "feeler/planner/bounds/orientations/difference_rows.h"
 #include "feeler/planner/bounds/orientations/oriented_certificates.h"
 #include "feeler/planner/contact/step_flags_grid.h"
 
@@ -42,15 +43,16 @@ class OrientedLines {
   std::uint32_t units_per_step() const { return units_per_step_; }
   Place PlaceOf(Axis axis, int orientation) const { return places_[axis][static_cast<std::size_t>(orientation)]; }
   const OrientedBox& box(int line) const { return lines_[static_cast<std::size_t>(line)].box; }
-  /// The values of a subset of two or more of a line, by box(line).Index; of one: null (it costs nothing).
-  const std::uint16_t* Plane(int line, unsigned subset) const;
+  using Plane = DifferenceRows<std::uint16_t>::Lane;
+  /// The values of a subset of two or more of a line, by box(line).Index; of one: no lane (it costs nothing).
+  Plane PlaneOf(int line, unsigned subset) const;
   std::size_t bytes() const;
 
  private:
   struct Line {
     std::vector<int> orientations;
     OrientedBox box;
-    SharedArray<std::uint16_t> values;  ///< plane after plane, by subset
+    DifferenceRows<std::uint16_t> values;  ///< a lane a subset
   };
   void AddLines(Axis axis, const Problem& problem, const StepFlagsGrid& flags, const std::vector<char>& used);
   struct LineBits;

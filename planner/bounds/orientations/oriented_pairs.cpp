@@ -5,6 +5,30 @@
 #include <utility>
 
 namespace feeler::planner {
+namespace {
+
+/// By cell of the box, bit d: the cell from which a step in direction d leads here lies outside.
+std::vector<std::uint8_t> EdgesOf(const OrientedBox& box) {
+  std::vector<std::uint8_t> edges(box.cells, 0);
+  const auto bit = [](Direction d) { return static_cast<std::uint8_t>(1U << IndexOf(d)); };
+  const Cell last = box.size - Cell::Ones();
+  std::size_t row = 0;
+  for (int z = 0; z <= last.z(); ++z) {
+    for (int y = 0; y <= last.y(); ++y, row += static_cast<std::size_t>(box.size.x())) {
+      std::uint8_t of_row = 0;
+      if (z == 0) of_row |= bit(Direction::kPlusZ);
+      if (z == last.z()) of_row |= bit(Direction::kMinusZ);
+      if (y == 0) of_row |= bit(Direction::kPlusY);
+      if (y == last.y()) of_row |= bit(Direction::kMinusY);
+      std::fill_n(&edges[row], box.size.x(), of_row);
+      edges[row] |= bit(Direction::kPlusX);
+      edges[row + static_cast<std::size_t>(last.x())] |= bit(Direction::kMinusX);
+    }
+  }
+  return edges;
+}
+
+}  // namespace
 
 OrientedPairs::OrientedPairs(std::shared_ptr<const StepFlagsGrid> flags, const StepCosts& costs,
                              std::shared_ptr<SharedPool> pool)
@@ -23,8 +47,12 @@ std::shared_ptr<const OrientedPairs::Plane> OrientedPairs::Get(const Cell& offse
   auto fresh = std::make_shared<const Plane>(Make(offset, orientation, other));
   const std::lock_guard lock(mutex_);
   if (bytes_ + fresh->values.size() > kMostBytes) {
-    planes_.clear();
-    bytes_ = 0;
+    // Tables that somebody holds take their memory all the same.
+    std::erase_if(planes_, [this](const auto& entry) {
+      if (entry.second.use_count() > 1) return false;
+      bytes_ -= entry.second->values.size();
+      return true;
+    });
   }
   const auto [at, added] = planes_.try_emplace(key, std::move(fresh));
   if (added) bytes_ += at->second->values.size();
@@ -60,35 +88,29 @@ std::vector<std::uint8_t> OrientedPairs::Build(const OrientedBox& box, const Cel
     queues[value].push_back(static_cast<std::uint32_t>(cell));
   };
   constexpr unsigned kBlockedSteps = (1U << kDirectionCount) - 1;
-  std::size_t cell = 0;
-  for (int z = box.domain.min.z(); z <= box.domain.max.z(); ++z) {
-    for (int y = box.domain.min.y(); y <= box.domain.max.y(); ++y) {
-      for (int x = box.domain.min.x(); x <= box.domain.max.x(); ++x, ++cell) {
-        const Cell here(x, y, z);
-        mine[cell] = flags_->At(here, orientation);
-        if (mine[cell] == kOutOfReach) continue;
-        const std::uint8_t flags = flags_->At(here - offset, other);
-        const unsigned theirs = flags == kOutOfReach ? kBlockedSteps : flags;
-        const unsigned tells = (theirs ^ mine[cell]) & kBlockedSteps;
-        if (tells == 0) continue;
-        reach(cell,
-              (tells & mine[cell]) != 0 ? std::min<unsigned>(contact_units_, (tells & ~mine[cell]) != 0 ? 1 : 60) : 1);
-      }
-    }
+  std::vector<std::uint8_t> theirs(box.cells);
+  flags_->Copy(box.domain, orientation, mine);
+  flags_->Copy({box.domain.min - offset, box.domain.max - offset}, other, theirs);
+  for (std::size_t cell = 0; cell < box.cells; ++cell) {
+    if (mine[cell] == kOutOfReach) continue;
+    const unsigned tells = ((theirs[cell] == kOutOfReach ? kBlockedSteps : theirs[cell]) ^ mine[cell]) & kBlockedSteps;
+    if (tells == 0) continue;
+    reach(cell,
+          (tells & mine[cell]) != 0 ? std::min<unsigned>(contact_units_, (tells & ~mine[cell]) != 0 ? 1 : 60) : 1);
   }
-  const auto strides = box.strides();
+  const std::vector<std::uint8_t> edges = EdgesOf(box);
+  std::array<std::int64_t, kDirectionCount> back{};  // to the cell before, by direction
+  for (const Direction d : kDirections) {
+    back[static_cast<std::size_t>(IndexOf(d))] = -SignOf(d) * box.strides()[static_cast<std::size_t>(AxisOf(d))];
+  }
   for (unsigned cost = 0; cost < queues.size(); ++cost) {
     for (std::size_t k = 0; k < queues[cost].size(); ++k) {
       const std::size_t to = queues[cost][k];
       if (values[to] != cost) continue;
-      const auto c = static_cast<int>(to);
-      const Cell at(c % box.size.x(), c / box.size.x() % box.size.y(), c / box.size.x() / box.size.y());
-      for (const Direction d : kDirections) {
-        const int position = at[AxisOf(d)] - SignOf(d);
-        if (position < 0 || position >= box.size[AxisOf(d)]) continue;
-        const auto from = static_cast<std::size_t>(static_cast<std::int64_t>(to) -
-                                                   SignOf(d) * strides[static_cast<std::size_t>(AxisOf(d))]);
-        if (mine[from] == kOutOfReach || (mine[from] >> IndexOf(d) & 1) != 0) continue;
+      for (std::size_t d = 0; d < kDirectionCount; ++d) {
+        if ((edges[to] >> d & 1) != 0) continue;
+        const auto from = static_cast<std::size_t>(static_cast<std::int64_t>(to) + back[d]);
+        if (mine[from] == kOutOfReach || (mine[from] >> d & 1) != 0) continue;
         reach(from, cost + 1);
       }
     }

@@ -21,7 +21,7 @@ namespace feeler::planner {
 /// a host, as long as the pool has room. Safe to use from many threads.
 class OrientedPairs {
  public:
-  static constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+  static constexpr std::size_t kMostBytes = std::size_t{1} << 29;
 
   struct Plane {
     OrientedBox box;

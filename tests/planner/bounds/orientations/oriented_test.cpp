@@ -3,7 +3,7 @@
 // certified solver and RTDP-Bel keep their promises; hypotheses that differ in nothing but an orientation that cannot
 // be felt are reported; canonical translation is exact; the table over orientations agrees with the table for one; the
 // tables of lines are what optimal policies cost; further first policies only improve; the heuristic of canonical
-// beliefs is that of the same beliefs in problem coordinates.
+// beliefs is that of the same beliefs in problem coordinates, and is the same after it has forgotten what it prepared.
 
 #include <gtest/gtest.h>
 
@@ -15,6 +15,7 @@
 #include "feeler/core/error.h"
 #include "feeler/planner/belief/belief_graph.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
+#include "feeler/planner/bounds/orientations/oriented_heuristic.h"
 #include "feeler/planner/bounds/orientations/oriented_lines.h"
 #include "feeler/planner/bounds/planning_tables.h"
 #include "feeler/planner/family/problem_family.h"
@@ -178,10 +179,32 @@ TEST(Oriented, TheTableAgreesWithTheOneForOneOrientation) {
     if (map->Blocked(at)) continue;
     const auto mask = static_cast<int>(random.Index(64));
     const OrientedBox& box = table.box(0);
-    const std::uint8_t value = table.Plane(0, static_cast<unsigned>(mask))[box.Index(at)];
+    const std::uint8_t value = table.PlaneOf(0, static_cast<unsigned>(mask))[box.Index(at)];
     const std::uint32_t with_way = value + (mask == 0 ? 0 : box.WayBack(at));
     ASSERT_EQ(with_way, one.Further(at, mask, 0)) << at.transpose() << " mask " << mask;
   }
+}
+
+TEST(Oriented, WhatIsForgottenIsPreparedAgain) {
+  const Task task = testing::MakePipeTask(2, 4);
+  const Problem problem = MakeCuboidProblem(task, testing::MakePipeMap(task, 0.25), {3, 3, 1, 3, 3});
+  const StepCosts costs = LowerStepCosts(task.cost, problem.move_lengths.back());
+  const auto flags = std::make_shared<const StepFlagsGrid>(*problem.map, Parallelism(1));
+  const auto table = std::make_shared<const OrientedCertificates>(problem, *flags, costs, Parallelism(1), nullptr);
+  const auto lines = std::make_shared<const OrientedLines>(problem, *flags, costs, Parallelism(1), nullptr);
+  const auto pairs = std::make_shared<const OrientedPairs>(flags, costs);
+  const ContactMasks masks(*problem.map);
+  BeliefGraph graph(problem, masks, true);
+  OrientedHeuristic keeps(problem, graph.sets(), table, pairs, lines);
+  OrientedHeuristic forgets(problem, graph.sets(), table, pairs, lines);
+  forgets.LimitPrepared(1000);
+  graph.SetHeuristic(&keeps);
+  GreedyCompletion<BeliefGraph> greedy(graph);
+  ASSERT_FALSE(greedy.Run(graph.Start(), [](std::int64_t) { return std::optional<SolverStatus>(); }));
+  for (BeliefId b = 0; b < graph.size(); ++b) {
+    ASSERT_EQ(forgets.Weighted(graph.set(b), graph.robot(b)), graph.Heuristic(b));
+  }
+  EXPECT_LT(forgets.bytes(), keeps.bytes() / 2);
 }
 
 TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
@@ -225,7 +248,7 @@ TEST(Oriented, LinesCostWhatTheBestPolicyDoes) {
     }
     const SolverResult result = Solve(problem, options, tables);
     const OrientedBox& box = lines.box(line);
-    const std::uint16_t value = lines.Plane(line, subset)[box.Index(problem.start)];
+    const std::uint16_t value = lines.PlaneOf(line, subset)[box.Index(problem.start)];
     if (!result.complete()) {
       EXPECT_EQ(value, OrientedLines::kNone);
       continue;
