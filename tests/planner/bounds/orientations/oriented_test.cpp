@@ -186,8 +186,10 @@ TEST(Oriented, TheTableAgreesWithTheOneForOneOrientation) {
 }
 
 TEST(Oriented, WhatIsForgottenIsPreparedAgain) {
-  const Task task = testing::MakePipeTask(2, 4);
-  const Problem problem = MakeCuboidProblem(task, testing::MakePipeMap(task, 0.25), {3, 3, 1, 3, 3});
+  Task task = testing::MakePipeTask(2, 4);
+  task.start_offset_m = Eigen::Vector3d(0.006, 0.0, 0.008);
+  task.workspace_m = Eigen::Vector3d(0.05, 0.044, 0.022);
+  const Problem problem = MakeCuboidProblem(task, testing::MakePipeMap(task, 0.25), {2, 2, 1, 3, 3});
   const StepCosts costs = LowerStepCosts(task.cost, problem.move_lengths.back());
   const auto flags = std::make_shared<const StepFlagsGrid>(*problem.map, Parallelism(1));
   const auto table = std::make_shared<const OrientedCertificates>(problem, *flags, costs, Parallelism(1), nullptr);
