@@ -9,7 +9,7 @@
 #include <memory>
 #include <numbers>
 
-#include "feeler/cad/align/candidates.h"
+#include "feeler/cad/align/directions.h"
 #include "feeler/cad/align/play.h"
 #include "feeler/cad/align/trials.h"
 #include "feeler/cad/measure/sliding.h"

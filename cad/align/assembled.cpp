@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "feeler/cad/align/alignment.h"
-#include "feeler/cad/align/candidates.h"
+#include "feeler/cad/align/directions.h"
 #include "feeler/cad/align/play.h"
 #include "feeler/cad/measure/sliding.h"
 #include "feeler/cad/mesh/mesh_tree.h"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "feeler/cad/align/candidates.h"
+#include "feeler/cad/align/features.h"
 #include "feeler/cad/mesh/mesh_tree.h"
 #include "feeler/cad/mesh/triangle_mesh.h"
 
