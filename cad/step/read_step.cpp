@@ -2,19 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <BRepMesh_Context.hxx>
-#include <BRepMesh_DelaunayBaseMeshAlgo.hxx>
-#include <BRepMesh_FaceDiscret.hxx>
-#include <BRepMesh_IncrementalMesh.hxx>
-#include <BRepMesh_MeshAlgoFactory.hxx>
 #include <BRep_Tool.hxx>
-#include <IMeshData_Edge.hxx>
-#include <IMeshData_Face.hxx>
-#include <IMeshData_PCurve.hxx>
-#include <IMeshData_Wire.hxx>
-#include <IMeshTools_MeshAlgo.hxx>
-#include <IMeshTools_MeshAlgoFactory.hxx>
-#include <IMeshTools_ModelAlgo.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Poly_Triangulation.hxx>
@@ -29,11 +17,11 @@
 #include <TransferBRep.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
-#include <cmath>
 #include <string>
 #include <utility>
 
 #include "feeler/cad/readers/read_apart.h"
+#include "feeler/cad/step/triangulate.h"
 
 namespace feeler::cad {
 namespace {
@@ -61,73 +49,6 @@ TriangleMesh MeshOf(const TopoDS_Shape& solid) {
     }
   }
   return mesh;
-}
-
-/// Straight lines run along planes, cylinders and cones from edge to edge: points within them add nothing to how near
-/// they are met, and Open CASCADE's grid on a cone is a hundred slabs to cut (cad/section). That holds of faces whose
-/// edges run along or around; where an edge is slanting (a bore that leans against its face), triangles from edge to
-/// edge would cut through the hollow.
-class NoPointsInside : public IMeshTools_MeshAlgo {
- public:
-  void Perform(const IMeshData::IFaceHandle& face, const IMeshTools_Parameters& parameters,
-               const Message_ProgressRange& range) override {
-    const GeomAbs_SurfaceType type = face->GetSurface()->GetType();
-    const bool straight = type == GeomAbs_Plane || ((type == GeomAbs_Cylinder || type == GeomAbs_Cone) && IsGrid(face));
-    const Handle(IMeshTools_MeshAlgo) algorithm = straight
-                                                      ? Handle(IMeshTools_MeshAlgo)(new BRepMesh_DelaunayBaseMeshAlgo)
-                                                      : BRepMesh_MeshAlgoFactory().GetAlgo(type, parameters);
-    if (!algorithm.IsNull()) algorithm->Perform(face, parameters, range);
-  }
-
- private:
-  /// Whether each edge runs along one of the parameters of the surface.
-  static bool IsGrid(const IMeshData::IFaceHandle& face) {
-    constexpr double kSame = 1e-6;
-    for (int w = 0; w < face->WiresNb(); ++w) {
-      const IMeshData::IWireHandle& wire = face->GetWire(w);
-      for (int e = 0; e < wire->EdgesNb(); ++e) {
-        const IMeshData::IPCurveHandle& curve = wire->GetEdge(e)->GetPCurve(face.get(), wire->GetEdgeOrientation(e));
-        bool along = true;
-        bool around = true;
-        for (int i = 1; i < curve->ParametersNb(); ++i) {
-          along = along && std::abs(curve->GetPoint(i).X() - curve->GetPoint(0).X()) < kSame;
-          around = around && std::abs(curve->GetPoint(i).Y() - curve->GetPoint(0).Y()) < kSame;
-        }
-        if (!along && !around) return false;
-      }
-    }
-    return true;
-  }
-};
-
-class NoPointsInsideFactory : public IMeshTools_MeshAlgoFactory {
- public:
-  Handle(IMeshTools_MeshAlgo)
-      GetAlgo(const GeomAbs_SurfaceType /*type*/, const IMeshTools_Parameters& /*parameters*/) const override {
-    return new NoPointsInside;
-  }
-};
-
-/// In the place of what puts such points on the seams of cones, and looks for triangles that an earlier run has left.
-class NoPointsOnSeams : public IMeshTools_ModelAlgo {
- protected:
-  Standard_Boolean performInternal(const Handle(IMeshData_Model) & /*model*/,
-                                   const IMeshTools_Parameters& /*parameters*/,
-                                   const Message_ProgressRange& /*range*/) override {
-    return true;
-  }
-};
-
-/// Gives every face its triangles.
-void Triangulate(const TopoDS_Shape& shape, double deflection_mm, double angle_rad) {
-  const Handle(BRepMesh_Context) context = new BRepMesh_Context;
-  context->SetPreProcessor(new NoPointsOnSeams);
-  context->SetFaceDiscret(new BRepMesh_FaceDiscret(new NoPointsInsideFactory));
-  BRepMesh_IncrementalMesh mesh;
-  mesh.SetShape(shape);
-  mesh.ChangeParameters().Deflection = deflection_mm;
-  mesh.ChangeParameters().Angle = angle_rad;
-  mesh.Perform(context);
 }
 
 /// The name that the file gives the solid; empty where it gives none.

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "feeler/cad/align/alignment.h"
 #include "feeler/cad/folder/task_folder.h"
@@ -257,6 +258,19 @@ TEST_F(CadParts, ClearancesAreThoseThatWereDrawn) {
         EXPECT_EQ(mating.tool_has_opening, kind.tool_has_opening) << where;
         EXPECT_EQ(mating.openings.empty(), kind.depth_mm == 0) << where;  // a slanting rim has no line at one height
       }) << where;
+    }
+  }
+}
+
+// Whatever edges end within its faces: triangles from edge to edge across a hollow would add to it, or take away.
+TEST_F(CadParts, TheTrianglesOfAStepFileHoldItsVolume) {
+  for (const PartKind& kind : PartKinds()) {
+    if (kind.assembled) continue;
+    const PartFiles step = WriteParts(kind.name, folder_, "step");
+    const PartFiles stl = WriteParts(kind.name, folder_, "stl");
+    for (const auto& [read, drawn] : {std::pair{step.tool, stl.tool}, {step.target, stl.target}}) {
+      const double volume = VolumeOf(Read(drawn).mesh);
+      EXPECT_NEAR(VolumeOf(Read(read).mesh), volume, 1e-3 * volume) << read;
     }
   }
 }

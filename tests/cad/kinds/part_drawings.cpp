@@ -206,6 +206,21 @@ PartPair KeyedShaft(double looser) {
   return {KeyedRod(0, 0, 45), Block(30, 30, -16, 0) - KeyedRod(c, -12, 1)};
 }
 
+/// The key begins above the tip and ends below the head: the shaft's face goes all around above and below it.
+PartPair ShortKey(double looser) {
+  const double c = 0.1 * looser;
+  return {Rod(0, 0, 6, 0, 45) + Box3(4, 7.5, -1.5, 1.5, 1.5, 28), Block(30, 30, -16, 0) - KeyedRod(c, -12, 1)};
+}
+
+/// A plug far longer than the plate is thick, and holes in the plate that are not for it.
+PartPair ThinPlate(double looser) {
+  const double c = 0.1 * looser;
+  const Shape others =
+      Rod(-40, 30, 6, -4, 1) + Rod(-45, -20, 20, -4, 1) + Rod(45, 25, 3, -4, 1) + Box3(15, 65, -40, 5, -4, 1);
+  return {(Rod(0, 0, 4, 0, 12) - Box3(3.2, 9, -9, 9, -1, 11)) + Rod(0, 0, 7, 11, 20) + Rod(0, 0, 3, 19, 50),
+          Block(150, 110, -3, 0) - others - (Rod(0, 0, 4 + c, -4, 1) - Box3(3.2 + c, 9, -9, 9, -5, 2))};
+}
+
 Shape Teeth(int count, double root, double tip, double z0, double z1) {
   Points points;
   for (int k = 0; k < count; ++k) {
@@ -322,6 +337,8 @@ PartPair DrawParts(const std::string& kind, double looser) {
       {"chamfered", Chamfered},
       {"chamfered-tee", ChamferedTee},
       {"keyed-shaft", KeyedShaft},
+      {"short-key", ShortKey},
+      {"thin-plate", ThinPlate},
       {"keyed-gear", KeyedGear},
       {"ring-gear", RingGear},
       {"hexagon", AsDrawn(Hexagon)},

@@ -115,6 +115,8 @@ std::vector<PartKind> PartKinds() {
                                  {"shell", 0.2, 0.2, 11.9},
                                  {"assembly", 0.15, 0.15, 12.0, false, true},
                                  {"keyed-shaft", 0.1, 0.1, 12.0},
+                                 {"short-key", 0.1, 0.1, 12.0},
+                                 {"thin-plate", 0.1, 0.1, 11.0},
                                  {"keyed-gear", 0.1, 0.1, 18.0, true},
                                  {"ring-gear", 0.0, 0.0, 10.0},
                                  {"hexagon", 0.1, 0.1, 11.0},
@@ -125,9 +127,9 @@ std::vector<PartKind> PartKinds() {
                                  {"filleted-bore", 0.1, 0.1, 12.0, false, false, true},
                                  {"oblique-bore", 0.1, 0.1, 0.0},
                                  {"oblique-slot", 0.15, 0.15, 0.0}};
-  const std::vector<std::string> scalable = {"keyed",      "d-plug",    "rj45",          "two-pin",  "three-pin",
-                                             "tilted",     "chamfered", "chamfered-tee", "assembly", "keyed-shaft",
-                                             "keyed-gear", "ring-gear", "ellipse",       "filleted"};
+  const std::vector<std::string> scalable = {
+      "keyed",    "d-plug",      "rj45",      "two-pin",    "three-pin",  "tilted",    "chamfered", "chamfered-tee",
+      "assembly", "keyed-shaft", "short-key", "thin-plate", "keyed-gear", "ring-gear", "ellipse",   "filleted"};
   for (PartKind& kind : kinds)
     kind.scalable_clearance = std::find(scalable.begin(), scalable.end(), kind.name) != scalable.end();
   return kinds;
