@@ -47,6 +47,13 @@ double AreaInHoles(const std::vector<SlabLoop>& inside, const std::vector<SlabLo
   return area;
 }
 
+/// The same of both parts in each other's holes, at a height.
+double AreaInHoles(const TriangleMesh& a, const TriangleMesh& b, double height_m, Eigen::AlignedBox2d& box) {
+  const std::vector<SlabLoop> of_a = SectionAt(a, height_m);
+  const std::vector<SlabLoop> of_b = SectionAt(b, height_m);
+  return AreaInHoles(of_a, of_b, box) + AreaInHoles(of_b, of_a, box);
+}
+
 std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const Trial& trial) {
   Pose roll = Pose::Identity();
   roll.linear() = Roll(trial.roll_rad);
@@ -81,14 +88,16 @@ std::optional<Found> Verify(const Turned& tool_part, const Turned& target, const
   const double bottom = std::min(found.offset.z() - (trial.low_m - tool_box.min().z()), rest);
   found.offset.z() -= rest < through ? rest : std::max(bottom, 0.0);
   found.engaged_m = trial.high_m - (tool_box.min().z() + found.offset.z());
-  const double middle = trial.high_m - 0.5 * found.engaged_m;
   TriangleMesh in = tool;
   for (Eigen::Vector3d& point : in.points) point += found.offset;
-  const std::vector<SlabLoop> tool_section = SectionAt(in, middle);
-  const std::vector<SlabLoop> target_section = SectionAt(target.mesh, middle);
   Eigen::AlignedBox2d held;
-  const double area = AreaInHoles(tool_section, target_section, held) + AreaInHoles(target_section, tool_section, held);
-  found.engaged_m3 = found.engaged_m * area;
+  double height = found.engaged_m;
+  double area = AreaInHoles(in, target.mesh, trial.high_m - 0.5 * height, held);
+  if (area == 0) {  // a tool that stands far out of a thin plate
+    height = std::min(height, trial.high_m - trial.low_m);
+    area = AreaInHoles(in, target.mesh, trial.high_m - 0.5 * height, held);
+  }
+  found.engaged_m3 = height * area;
   found.middle = held.isEmpty() ? BoundsOf(in).center().head<2>().eval() : held.center();
   found.mouth = target.rotation.transpose() * Eigen::Vector3d(found.middle.x(), found.middle.y(), trial.high_m);
   return found;
