@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "feeler/cad/mesh/triangle_mesh.h"
@@ -46,7 +47,28 @@ class BoxTree {
     }
   }
 
+  /// The same where what is true of a box is so of those within: `narrow(box, state)` gives what is left of the state
+  /// of the box around, or nothing where the box is not to be looked into; `visit` gets that of the leaf, too.
+  template <class State, class Narrow, class Visit>
+  void DescendWith(const State& state, const Narrow& narrow, const Visit& visit) const {
+    if (!nodes_.empty()) DescendWith(nodes_.front(), state, narrow, visit);
+  }
+
  private:
+  template <class State, class Narrow, class Visit>
+  bool DescendWith(const Node& node, const State& around, const Narrow& narrow, const Visit& visit) const {
+    const std::optional<State> state = narrow(node.box, around);
+    if (!state) return true;
+    if (node.count == 0) {
+      return DescendWith(nodes_[static_cast<std::size_t>(node.first)], *state, narrow, visit) &&
+             DescendWith(nodes_[static_cast<std::size_t>(node.second)], *state, narrow, visit);
+    }
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      if (!visit(order_[static_cast<std::size_t>(i)], *state)) return false;
+    }
+    return true;
+  }
+
   int Build(const std::vector<Box>& boxes, int first, int count);
 
   std::vector<int> order_;

@@ -112,17 +112,13 @@ bool MeshTree::Inside(const Eigen::Vector3d& p) const {
   static const std::array<Eigen::Vector3d, 3> kDirections = {Eigen::Vector3d(0.4136718, 0.6370233, 0.6504911),
                                                              Eigen::Vector3d(-0.7213402, 0.3091177, 0.6197771),
                                                              Eigen::Vector3d(0.2271903, -0.8534107, -0.4690123)};
-  int votes = 0;
-  for (const Eigen::Vector3d& direction : kDirections) votes += Crossings(p, direction) > 0 ? 1 : 0;
-  return votes >= 2;
+  const auto inside = [&](std::size_t ray) { return Crossings(p, kDirections[ray]) > 0; };
+  const bool first = inside(0);
+  return first == inside(1) ? first : inside(2);
 }
 
 void MeshTree::Visit(const Box& box, const std::function<bool(int)>& visit) const {
   const auto meets = [&](const Box& other) { return other.intersects(box); };
-  tree_.Descend(meets, [&](int t) { return !meets(BoundsOf(mesh_, t)) || visit(t); });
-}
-
-void MeshTree::VisitWhere(const std::function<bool(const Box&)>& meets, const std::function<bool(int)>& visit) const {
   tree_.Descend(meets, [&](int t) { return !meets(BoundsOf(mesh_, t)) || visit(t); });
 }
 

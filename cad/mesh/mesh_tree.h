@@ -27,10 +27,9 @@ class MeshTree {
   double DistanceToSolid(const Eigen::Vector3d& p) const { return Inside(p) ? 0.0 : Distance(p); }
   /// Calls `visit` for each triangle whose box meets `box`, until it returns false.
   void Visit(const Box& box, const std::function<bool(int)>& visit) const;
-  /// The same for each whose box, and those around it, `meets` accepts.
-  void VisitWhere(const std::function<bool(const Box&)>& meets, const std::function<bool(int)>& visit) const;
 
   const TriangleMesh& mesh() const { return mesh_; }
+  const BoxTree& boxes() const { return tree_; }  ///< of the triangles
 
  private:
   int Crossings(const Eigen::Vector3d& p, const Eigen::Vector3d& direction) const;

@@ -1,6 +1,7 @@
 #include "feeler/cad/pieces/clip.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace feeler::cad {
 
@@ -32,16 +33,20 @@ bool IsBeyond(const Polygon3& polygon, const HalfSpace& plane, double grow_m) {
 
 }  // namespace
 
-Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m) {
-  for (const HalfSpace& plane : piece.planes) {
+Polygon3 ClipToPlanes(Polygon3 polygon, const std::vector<HalfSpace>& planes, double grow_m) {
+  for (const HalfSpace& plane : planes) {
     if (IsBeyond(polygon, plane, grow_m)) return {};
   }
-  for (const HalfSpace& plane : piece.planes) {
+  for (const HalfSpace& plane : planes) {
     if (IsWithin(polygon, plane, grow_m)) continue;
     polygon = Clip(polygon, plane.normal, plane.offset_m + grow_m);
     if (polygon.empty()) break;
   }
   return polygon;
+}
+
+Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m) {
+  return ClipToPlanes(std::move(polygon), piece.planes, grow_m);
 }
 
 std::vector<Polygon3> Outside(const Polygon3& polygon, const ConvexPiece& piece, double grow_m) {

@@ -14,6 +14,8 @@ using Polygon3 = std::vector<Eigen::Vector3d>;
 Polygon3 Clip(const Polygon3& polygon, const Eigen::Vector3d& normal, double offset_m);
 /// Whether all of it is within a half-space whose plane is moved outward by `grow_m`.
 bool IsWithin(const Polygon3& polygon, const HalfSpace& plane, double grow_m);
+/// The part of it within half-spaces whose planes are all moved outward by `grow_m`.
+Polygon3 ClipToPlanes(Polygon3 polygon, const std::vector<HalfSpace>& planes, double grow_m);
 /// The part of it within a piece whose planes are all moved outward by `grow_m`.
 Polygon3 ClipToPiece(Polygon3 polygon, const ConvexPiece& piece, double grow_m);
 /// The parts of it outside of such a piece, convex and apart.

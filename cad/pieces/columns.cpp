@@ -7,6 +7,7 @@
 
 #include "feeler/cad/pieces/clip.h"
 #include "feeler/cad/pieces/envelope.h"
+#include "feeler/cad/pieces/stays_inside.h"
 #include "feeler/cad/section/convex_partition.h"
 
 namespace feeler::cad {

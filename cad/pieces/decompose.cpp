@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "feeler/cad/mesh/mesh_tree.h"
-#include "feeler/cad/pieces/clip.h"
 #include "feeler/cad/pieces/columns.h"
+#include "feeler/cad/pieces/stays_inside.h"
 #include "feeler/cad/section/convex_partition.h"
 #include "feeler/cad/section/section.h"
 
@@ -242,30 +242,6 @@ class Merger {
 };
 
 }  // namespace
-
-bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options) {
-  bool inside = true;
-  // Of a thin hull nothing would be left to enter: it could close a hole.
-  const double thin = 0.2 * hull.bounds.sizes().minCoeff();
-  const double loose = std::min(thin, std::max(options.tolerance_near_m, options.tolerance_far_m));
-  const double tight = std::min({thin, options.tolerance_near_m, options.tolerance_far_m});
-  const auto enters = [&](const Box& box) {
-    const Eigen::Vector3d center = box.center();
-    const Eigen::Vector3d half = 0.5 * box.sizes();
-    return std::none_of(hull.planes.begin(), hull.planes.end(), [&](const HalfSpace& plane) {
-      return plane.normal.dot(center) - plane.normal.cwiseAbs().dot(half) > plane.offset_m - 0.9 * tight;
-    });
-  };
-  solid.VisitWhere(enters, [&](int t) {
-    const TriangleMesh& mesh = solid.mesh();
-    const Polygon3 triangle{mesh.Corner(t, 0), mesh.Corner(t, 1), mesh.Corner(t, 2)};
-    const Polygon3 entered = ClipToPiece(triangle, hull, -tight);
-    if (entered.empty()) return true;
-    inside = loose > tight && ClipToPiece(entered, hull, -loose).empty() && ClipToBox(entered, options.mating).empty();
-    return inside;
-  });
-  return inside;
-}
 
 std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOptions& options) {
   constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();

@@ -27,9 +27,4 @@ std::vector<ConvexPiece> Decompose(const TriangleMesh& solid, const DecomposeOpt
 std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid, const DecomposeOptions& options,
                                                        std::size_t most_bodies, std::size_t most_pieces);
 
-class MeshTree;
-
-/// Whether the surface of the solid does not enter a hull by more than the tolerances.
-bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options);
-
 }  // namespace feeler::cad

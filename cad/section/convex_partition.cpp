@@ -167,14 +167,16 @@ Hit Shoot(const Region& region, const Eigen::Vector2d& from, const Eigen::Vector
     const SlabLoop& loop = region.loops[l];
     for (std::size_t i = 0; i < loop.size(); ++i) {
       const Eigen::Vector2d& a = loop[i].*at;
-      const Eigen::Vector2d side = loop[(i + 1) % loop.size()].*at - a;
+      const Eigen::Vector2d side = loop[i + 1 < loop.size() ? i + 1 : 0].*at - a;
       const double across = Cross(direction, side);
       if (across <= 0) continue;  // the ray leaves the material from a side's left to its right
-      const double t = Cross(a - from, side) / across;
+      const double t_across = Cross(a - from, side);
+      if (t_across <= kTouch_m * across || t_across >= hit.distance * across) continue;
       const double s = Cross(a - from, direction) / across;
+      if (s < -1 || s > 2) continue;  // farther beside than any slack; lengths of sides cost more
       const double slack = kTouch_m / std::max(side.norm(), kTouch_m);
-      if (t <= kTouch_m || t >= hit.distance || s < -slack || s > 1 + slack) continue;
-      hit = {{l, i, std::clamp(s, 0.0, 1.0)}, t, side.normalized()};
+      if (s < -slack || s > 1 + slack) continue;
+      hit = {{l, i, std::clamp(s, 0.0, 1.0)}, t_across / across, side.normalized()};
     }
   }
   return hit;
@@ -296,6 +298,20 @@ class Cutter {
     }
   }
 
+  /// The nearest, in order; of those as near the first. Most of many are far: they are not put in order.
+  static void KeepNearest(std::vector<std::pair<double, const Corner*>>& partners) {
+    if (partners.size() > kMostPartners) {
+      std::vector<double> distances;
+      for (const auto& [distance, other] : partners) distances.push_back(distance);
+      const auto last = distances.begin() + (kMostPartners - 1);
+      std::nth_element(distances.begin(), last, distances.end());
+      std::erase_if(partners, [&](const auto& partner) { return partner.first > *last * (1 + 1e-6); });
+    }
+    std::stable_sort(partners.begin(), partners.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first * (1 - 1e-9); });
+    if (partners.size() > kMostPartners) partners.resize(kMostPartners);
+  }
+
   void ToPartner(const Region& region, const Corner& corner, const std::vector<Corner>& reflex, double least_angle,
                  Cut& best) const {
     const double least = std::max(corner.angle - kPi, 0.0);
@@ -305,23 +321,21 @@ class Cutter {
       const double distance = (other.at - corner.at).norm();
       if (distance > kTouch_m) partners.emplace_back(distance, &other);
     }
-    std::stable_sort(partners.begin(), partners.end(),
-                     [](const auto& a, const auto& b) { return a.first < b.first * (1 - 1e-9); });
-    if (partners.size() > kMostPartners) partners.resize(kMostPartners);
+    KeepNearest(partners);
     for (const auto& [distance, other] : partners) {
       const Eigen::Vector2d direction = (other->at - corner.at) / distance;
       const double angle = Turn(corner.to_next, direction);
       if (angle < least - 1e-9 || angle > most + 1e-9) continue;
       if (std::min(angle, corner.angle - angle) < std::max(least_angle, 1e-6)) continue;
-      if (!Within(*other, -direction) || !Reaches(region, corner, *other)) continue;
+      if (!Within(*other, -direction)) continue;
       const double there = Turn(other->to_next, -direction);
       if (std::min(there, other->angle - there) < least_angle) continue;
       const bool both = there >= other->angle - kPi - 1e-9 && there <= kPi + 1e-9;
       const double score =
           distance * (both ? 0.5 : 1.0) /
           (Squareness(std::min(angle, corner.angle - angle)) * Squareness(std::min(there, other->angle - there)));
-      if (score < best.score * (1 - 1e-9))
-        best = {other->place, region.loops[other->place.loop][other->place.index], score};
+      if (score >= best.score * (1 - 1e-9) || !Reaches(region, corner, *other)) continue;
+      best = {other->place, region.loops[other->place.loop][other->place.index], score};
     }
   }
 

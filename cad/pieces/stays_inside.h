@@ -1,0 +1,12 @@
+#pragma once
+
+#include "feeler/cad/mesh/mesh_tree.h"
+#include "feeler/cad/pieces/convex_piece.h"
+#include "feeler/cad/pieces/decompose.h"
+
+namespace feeler::cad {
+
+/// Whether the surface of the solid does not enter a hull by more than the tolerances.
+bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options);
+
+}  // namespace feeler::cad
