@@ -16,6 +16,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kJudgeDepth_m = 2e-6;
 /// An end that lies deeper than this in another obstacle decides nothing.
 constexpr double kHiddenDepth_m = 1e-4;
+/// An obstacle that lies deeper than this in what others block has no say, far beyond rounding.
+constexpr double kCoveredDepth_m = 1e-9;
 
 }  // namespace
 
@@ -104,11 +106,33 @@ void LineSweep::Judge(const ObstacleSet::Obstacle& obstacle, int axis, Eigen::Ve
   cut.high_m = high;
 }
 
+void LineSweep::Cover(const planner::Cut& cut) {
+  BlockedStretch all{cut.low_m, cut.high_m};
+  std::erase_if(covered_, [&](const BlockedStretch& other) {
+    const bool meets = other.low_m <= all.high_m && other.high_m >= all.low_m;
+    if (meets) all = {std::min(all.low_m, other.low_m), std::max(all.high_m, other.high_m)};
+    return meets;
+  });
+  covered_.push_back(all);
+}
+
+bool LineSweep::IsCovered(const planner::ConvexObstacle& shape, int axis) const {
+  return std::any_of(covered_.begin(), covered_.end(), [&](const BlockedStretch& stretch) {
+    return stretch.low_m < shape.min_m()[axis] - kCoveredDepth_m &&
+           stretch.high_m > shape.max_m()[axis] + kCoveredDepth_m;
+  });
+}
+
 const std::vector<BlockedStretch>& LineSweep::Sweep(int axis, const Eigen::Vector3d& point_m, bool judged) {
   stretches_.clear();
   cuts_.clear();
+  covered_.clear();
   for (const ObstacleSet::Obstacle& obstacle : set_.obstacles) {
-    if (const auto cut = obstacle.shape.CutBy(axis, point_m)) cuts_.push_back({&obstacle, *cut});
+    if (!judged && IsCovered(obstacle.shape, axis)) continue;  // its ends would be looked at by the judge
+    const auto cut = obstacle.shape.CutBy(axis, point_m);
+    if (!cut) continue;
+    cuts_.push_back({&obstacle, *cut});
+    if (!judged) Cover(*cut);
   }
   if (judged) {
     judged_ = cuts_;

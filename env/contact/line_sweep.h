@@ -65,6 +65,8 @@ class LineSweep {
     planner::Cut cut;
   };
   bool Hidden(double end_m) const;
+  void Cover(const planner::Cut& cut);
+  bool IsCovered(const planner::ConvexObstacle& shape, int axis) const;
   void Judge(const ObstacleSet::Obstacle& obstacle, int axis, Eigen::Vector3d point_m, planner::Cut& cut);
   double JudgeEnd(int tool_geom, int target_geom, int axis, Eigen::Vector3d& point_m, double end_m, double inside_m,
                   double probe_m);
@@ -72,8 +74,9 @@ class LineSweep {
   const ObstacleSet& set_;
   double accuracy_m_;
   OverlapJudge judge_;
-  std::vector<FoundCut> cuts_;    ///< of the line being swept
-  std::vector<FoundCut> judged_;  ///< the same with ends as MuJoCo sees them
+  std::vector<FoundCut> cuts_;           ///< of the line being swept
+  std::vector<FoundCut> judged_;         ///< the same with ends as MuJoCo sees them
+  std::vector<BlockedStretch> covered_;  ///< by the cuts so far, disjoint
   std::vector<BlockedStretch> stretches_;
   std::int64_t corrections_ = 0;
   double largest_correction_m_ = 0.0;

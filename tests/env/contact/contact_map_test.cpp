@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "feeler/core/error.h"
 #include "feeler/core/lattice_grid.h"
@@ -304,6 +305,34 @@ TEST_F(PlugMap, MujocoAgreesWithTheSweeps) {
   }
   EXPECT_LT(sweep.corrections(), 30);
   EXPECT_LT(sweep.largest_correction_m(), 1e-4);
+}
+
+// What others cover is left out of a sweep that MuJoCo does not judge: the union is that of all, to the bit.
+TEST_F(PlugMap, ASweepIsTheUnionOfAllObstacles) {
+  const ObstacleSet set(*plug_, GeomsOf(*plug_, Opening::kOpen), Eigen::Quaterniond::Identity());
+  LineSweep sweep(set, 1e-9);
+  RandomStream random(6, 0, "lines");
+  for (int i = 0; i < 3000; ++i) {
+    const int axis = i % 3;
+    const Eigen::Vector3d point(random.Uniform(-0.08, 0.08), random.Uniform(-0.07, 0.07), random.Uniform(-0.04, 0.01));
+    const std::vector<BlockedStretch>& stretches = sweep.Sweep(axis, point, false);
+    std::vector<bool> low_met(stretches.size(), false);
+    std::vector<bool> high_met(stretches.size(), false);
+    for (const ObstacleSet::Obstacle& obstacle : set.obstacles) {
+      const auto cut = obstacle.shape.CutBy(axis, point);
+      if (!cut) continue;
+      bool held = false;
+      for (std::size_t k = 0; k < stretches.size(); ++k) {
+        held = held || (stretches[k].low_m <= cut->low_m && cut->high_m <= stretches[k].high_m);
+        low_met[k] = low_met[k] || cut->low_m == stretches[k].low_m;
+        high_met[k] = high_met[k] || cut->high_m == stretches[k].high_m;
+      }
+      EXPECT_TRUE(held) << i;
+    }
+    if (!set.half_spaces.empty()) continue;
+    EXPECT_THAT(low_met, testing::Each(true)) << i;
+    EXPECT_THAT(high_met, testing::Each(true)) << i;
+  }
 }
 
 TEST_F(PlugMap, SameAtAnyNumberOfThreads) {
