@@ -92,7 +92,7 @@ class OrientedHeuristic final : public BeliefHeuristic {
   Cell spread_;
   int pitches_;
   bool uniform_;
-  std::size_t most_prepared_bytes_ = std::size_t{96} << 20;
+  std::size_t most_prepared_bytes_ = std::size_t{256} << 20;
   std::map<std::array<int, 5>, std::shared_ptr<const OrientedPairs::Plane>> pair_planes_;  ///< that runs point into
   std::vector<Terms> terms_of_;
   std::vector<Run> runs_;
