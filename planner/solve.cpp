@@ -94,7 +94,7 @@ SolverResult SolveFromEqualWeights(const Problem& problem, const SolverOptions& 
   SolverOptions quiet = options;  // its bounds are those of another problem
   quiet.on_bounds = nullptr;
   watch.LimitTo(0.5);
-  const SolverResult first = SolveInWorkspace(equal, quiet, tables, {}, watch);
+  SolverResult first = SolveInWorkspace(equal, quiet, tables, {}, watch);
   watch.LimitTo(1.0);
   if (first.status == SolverStatus::kUnlocalizable) return first;
   return Attempt(problem, options, tables, {}, watch, false, first.policy ? &*first.policy : nullptr);

@@ -96,8 +96,7 @@ Seen RunEpisodesAtRims(const planner::Extents& extents, int episodes) {
   const Task task = HousingTask();
   const planner::Problem problem = planner::MakeCuboidProblem(task, HousingMap(), extents);
   const planner::SolverOptions solver = planner::FastSetting(planner::SolverKind::kRtdpBel, 1.2);
-  static const auto tables = planner::BuildPlanningTables(problem, solver);  // shared: one map, one set of costs
-  const auto graph = std::make_shared<planner::PolicyGraph>(*planner::Solve(problem, solver, tables).policy);
+  const auto graph = std::make_shared<planner::PolicyGraph>(*planner::Solve(problem, solver).policy);
   const Pose start = LatticeStartPose(task, problem, Pose::Identity());
   ExecutorOptions options;
   options.force_budget_n = kBudget_n;
@@ -168,13 +167,9 @@ TEST(FallIn, AToolInTheOpeningGoesAsideAsSlowlyAsWallsThatHoldItAsk) {
 }
 
 TEST(FallIn, AMotionThatIsNotWatchedGoesWhereTheToolCameFrom) {
-  int grazes = 0;
-  for (const planner::Extents& extents : {planner::Extents{2, 6, 3}, {5, 2, 4}}) {
-    const Seen seen = RunEpisodesAtRims(extents, 150);
-    grazes += seen.grazes;
-    EXPECT_EQ(seen.blind, 0) << extents[0] << extents[1] << extents[2];
-  }
-  EXPECT_GT(grazes, 5) << "no edge was shifted off";
+  const Seen seen = RunEpisodesAtRims({5, 2, 4}, 150);
+  EXPECT_EQ(seen.blind, 0);
+  EXPECT_GT(seen.grazes, 5) << "no edge was shifted off";
 }
 
 }  // namespace

@@ -36,6 +36,11 @@ class ContactResponseTest : public ::testing::Test {
   Eigen::Vector3d InWorld(const Eigen::Vector3d& direction) const {
     return scene_->task.world_T_target.linear() * direction;
   }
+  /// As the executor counts: faces lie across the insertion and hold the tool.
+  ContactResponse Met(const Wall& wall) const {
+    const ContactResponse told = robot_.Contact(InWorld(wall.direction));
+    return wall.direction.z() < -0.9 ? told.Held() : told;
+  }
   double PeakForce(const Wall& wall, double speed_m_s) {
     Place(wall.start_m);
     GuardedMotion motion;
@@ -83,7 +88,7 @@ TEST_F(ContactResponseTest, TheSpeedOfABudgetKeepsIt) {
   for (const double budget_n : {10.0, 17.0, 25.0, 60.0}) {
     for (const Wall& wall : walls_) {
       Place(wall.start_m);
-      const ContactResponse contact = robot_.Contact(InWorld(wall.direction));
+      const ContactResponse contact = Met(wall);
       const double speed_m_s = execution::SpeedWithinBudget(contact, budget_n);
       const double peak_n = PeakForce(wall, speed_m_s);
       EXPECT_LE(peak_n, budget_n) << wall.direction.transpose() << " at " << speed_m_s;
@@ -126,7 +131,7 @@ TEST_F(ContactResponseTest, FrictionOfTheJointsIsCountedWith) {
       back.translation() -= 0.01 * InWorld(wall.direction);
       robot_.LinearMove(back, 0.1, 10.0);
       robot_.LinearMove(start, 0.1, 10.0);
-      const ContactResponse contact = robot_.Contact(InWorld(wall.direction));
+      const ContactResponse contact = Met(wall);
       EXPECT_GT(contact.push_n, 1.0);
       GuardedMotion motion;
       motion.direction = InWorld(wall.direction);
@@ -145,7 +150,7 @@ TEST_F(ContactResponseTest, ALateSensorIsCountedWith) {
     delay_s_ = delay_s;
     for (const Wall& wall : walls_) {
       Place(wall.start_m);
-      const double speed_m_s = execution::SpeedWithinBudget(robot_.Contact(InWorld(wall.direction)), 25.0);
+      const double speed_m_s = execution::SpeedWithinBudget(Met(wall), 25.0);
       const double peak_n = PeakForce(wall, speed_m_s);
       EXPECT_LE(peak_n, 25.0) << wall.direction.transpose() << " at " << speed_m_s << ", late by " << delay_s;
       EXPECT_GE(peak_n, 5.0);
