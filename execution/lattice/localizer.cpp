@@ -440,17 +440,17 @@ void Localizer::ShiftOffEdge(const Touch& touch) {
   const std::optional<Eigen::Vector3d> shift = GrazeShift(*problem_.map, tracked_, touch, mover_.options().matching);
   if (!shift || record_.grazes >= mover_.options().graze_attempts) FailOffTree(touch);
   ++record_.grazes;
-  // Where no hypothesis is right the place on the other side of the edge may be taken.
+  // The tool may stand right beside the wall of the target that it has passed.
   const Eigen::Vector3d begun = mover_.position();
   const Direction side = DirectionOf(*shift).value();
   const double from = begun[AxisOf(side)];
   const MotionReport report = mover_.Probe(side, from + (*shift)[AxisOf(side)], "probe", {});
+  anchor_ += *shift;
   if (report.contact) {
     evidence_.push_back(MakeTouch(side, from, report));
     mover_.Retreat(begun);
-    FailOffTree(touch);
+    kept_offset_ -= *shift;
   }
-  anchor_ += *shift;
   for (TrackedHypothesis& t : tracked_) t.anchor += *shift;
 }
 
