@@ -30,8 +30,9 @@ class OutputFile {
   /// Syncs to the disk and puts the file in its place. Throws InputError.
   void Commit();
 
-  /// The file that is written now: for another process (an encoder) to write to in place of `Write`. Empty if direct.
-  const std::string& part() const { return part_; }
+  /// What is written now: for another process (an encoder) to inherit and write to in place of `Write`. By its name it
+  /// could not: whoever opens the part after a signal took it away makes it anew. -1 after Commit.
+  int descriptor() const { return descriptor_; }
   /// True if there is nothing to replace: a device, a FIFO or a descriptor.
   bool direct() const { return part_.empty(); }
 

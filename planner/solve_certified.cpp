@@ -99,7 +99,7 @@ void CloseGap(SolveRun& run, Incumbent& incumbent) {
   const auto lower = [&] { return std::max(result.lower_bound, search.Lower(run.start) / run.weight); };
   const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
     const double upper = search.Upper(run.start) / run.weight;
-    if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
+    if (run.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
     if (upper <= run.options.gap * lower()) return SolverStatus::kGap;
     return run.Stop(expansions, search.bytes() + incumbent.bytes());
   };

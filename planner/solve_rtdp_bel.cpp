@@ -17,7 +17,7 @@ void Search(SolveRun& run, Initial initial) {
     return std::max(search.Lower(run.start), search.Value(run.start) / run.options.epsilon) / run.weight;
   };
   const auto why = search.Run(run.start, [&](std::int64_t expansions) {
-    if (run.watch.RowDue()) run.Row(search.trials(), expansions, lower(), std::numeric_limits<double>::infinity());
+    if (run.RowDue()) run.Row(search.trials(), expansions, lower(), std::numeric_limits<double>::infinity());
     return run.Stop(expansions, search.bytes());
   });
   run.result.lower_bound = lower();

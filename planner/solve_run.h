@@ -24,6 +24,8 @@ struct SolveRun {
 
   /// Why to stop now, after so many expansions of this attempt and with so much memory in the searches; empty to go on.
   std::optional<SolverStatus> Stop(std::int64_t expansions, std::size_t search_bytes);
+  /// Whether somebody listens and a row of the bounds table is due: who is not heard uses up no row of the next search.
+  bool RowDue() { return options.on_bounds && watch.RowDue(); }
   /// Reports a row of the bounds table; `expansions` of this attempt.
   void Row(std::int64_t trials, std::int64_t expansions, double lower, double upper) const;
 

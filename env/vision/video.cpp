@@ -15,18 +15,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "feeler/core/error.h"
 
 namespace feeler::env {
 
-// ffmpeg as a child process: frames into its standard input, its complaints kept in an unnamed file.
+// ffmpeg as a child process: frames into its standard input, the video into a descriptor that it inherits, its
+// complaints kept in an unnamed file.
 class VideoWriter::Process {
  public:
-  explicit Process(std::vector<std::string> arguments) {
+  static constexpr int kOutput = 3;  // descriptor of the child
+
+  Process(std::vector<std::string> arguments, int output) {
     // A socket instead of a pipe: writing to a child that has died is then an error, not a signal to this process.
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -43,6 +46,7 @@ class VideoWriter::Process {
     } else {
       posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     }
+    posix_spawn_file_actions_adddup2(&actions, output, kOutput);  // last: it may be one of those above
     // A group of its own: Ctrl-C is for us; we end the video.
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
@@ -130,19 +134,19 @@ class VideoWriter::Process {
 
 namespace {
 
-/// A new empty file of our own for an encoder to write to.
-std::string TemporaryFile() {
+/// The descriptor of a new empty file without a name: however this process ends, nothing is left of it.
+int UnnamedFile() {
   std::error_code error;
   std::filesystem::path folder = std::filesystem::temp_directory_path(error);
   if (error) folder = "/tmp";
   std::string name = (folder / "feeler-video-XXXXXX").string();
-  const int descriptor = mkstemp(name.data());
+  const int descriptor = mkostemp(name.data(), O_CLOEXEC);
   if (descriptor < 0) {
     throw InputError(folder.string(), std::string("cannot write the video: ") + std::strerror(errno),
                      "set TMPDIR to a folder where you may write");
   }
-  close(descriptor);
-  return name;
+  unlink(name.c_str());
+  return descriptor;
 }
 
 }  // namespace
@@ -156,8 +160,7 @@ VideoWriter::VideoWriter(const std::string& path, const VideoOptions& options) :
   // The place must be there before we render. What is not a regular file takes the video at the end: an encoder goes
   // back in what it writes.
   output_ = std::make_unique<OutputFile>(path);
-  part_ = output_->direct() ? TemporaryFile() : output_->part();
-  // A path may begin with a dash; with a protocol in front ffmpeg takes it for nothing but a file.
+  if (output_->direct()) buffer_ = UnnamedFile();
   try {
     process_ =
         std::make_unique<Process>(std::vector<std::string>{"ffmpeg",
@@ -189,22 +192,22 @@ VideoWriter::VideoWriter(const std::string& path, const VideoOptions& options) :
                                                            "+faststart",
                                                            "-f",
                                                            "mp4",
-                                                           "file:" + part_});
+                                                           fmt::format("file:/proc/self/fd/{}", Process::kOutput)},
+                                  buffer_ >= 0 ? buffer_ : output_->descriptor());
   } catch (...) {
-    RemovePart();
+    Discard();
     throw;
   }
 }
 
-void VideoWriter::RemovePart() {
-  if (output_ && output_->direct()) std::remove(part_.c_str());
+void VideoWriter::Discard() {
+  if (buffer_ >= 0) close(std::exchange(buffer_, -1));
   output_.reset();  // takes its part away
 }
 
 VideoWriter::~VideoWriter() {
-  if (!process_) return;
   process_.reset();
-  RemovePart();
+  Discard();
 }
 
 void VideoWriter::Add(const Image& frame) {
@@ -225,17 +228,22 @@ void VideoWriter::Finish() {
   const std::string complaint = process_->Complaint();
   process_.reset();
   if (!good || frames_ == 0) {
-    RemovePart();
+    Discard();
     throw InputError(path_, frames_ == 0 ? "a video without frames" : "the video was not written: " + complaint,
                      "check disk space and the ffmpeg installation");
   }
-  if (output_->direct()) {
-    std::ifstream in(part_, std::ios::binary);
+  if (buffer_ >= 0) {
     std::vector<char> chunk(1 << 16);
-    while (in.read(chunk.data(), static_cast<std::streamsize>(chunk.size())) || in.gcount() > 0) {
-      output_->Write({chunk.data(), static_cast<std::size_t>(in.gcount())});
+    off_t at = 0;
+    while (true) {
+      const ssize_t count = pread(buffer_, chunk.data(), chunk.size(), at);
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) throw InputError(path_, std::string("the video was lost: ") + std::strerror(errno), "try again");
+      if (count == 0) break;
+      output_->Write({chunk.data(), static_cast<std::size_t>(count)});
+      at += count;
     }
-    std::remove(part_.c_str());
+    close(std::exchange(buffer_, -1));
   }
   output_->Commit();
 }

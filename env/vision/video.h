@@ -37,12 +37,12 @@ class VideoWriter {
 
  private:
   class Process;
-  void RemovePart();
+  void Discard();
 
   std::string path_;
-  std::string part_;
   VideoOptions options_;
   std::unique_ptr<OutputFile> output_;
+  int buffer_ = -1;  // a file without a name, where the output cannot be gone back in; else -1
   std::unique_ptr<Process> process_;
   std::int64_t frames_ = 0;
 };

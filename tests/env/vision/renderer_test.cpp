@@ -16,6 +16,7 @@
 #include <fstream>
 
 #include "feeler/core/error.h"
+#include "feeler/core/file_output.h"
 #include "feeler/core/random.h"
 #include "feeler/env/vision/video.h"
 
@@ -195,6 +196,21 @@ TEST(Video, LeavesNothingBehindWhenItIsNotFinished) {
   EXPECT_THROW(VideoWriter(folder / "a.mp4", options), InputError);
   options.width = 64;
   EXPECT_THROW(VideoWriter("/nonexistent/folder/a.mp4", options), InputError);
+}
+
+// An encoder that comes to its output late must not make anew what a signal has taken away.
+TEST(Video, IsNotMadeAnewAfterASignalTookItAway) {
+  const TemporaryFolder folder("feeler_video_signalled");
+  VideoOptions options;
+  options.width = 64;
+  options.height = 48;
+  {
+    VideoWriter video(folder / "a.mp4", options);
+    SettleOutputsInSignalHandler();
+    video.Add(Frame(64, 48, 100));
+    EXPECT_THROW(video.Finish(), InputError);
+  }
+  EXPECT_TRUE(folder.empty());
 }
 
 TEST(Video, SaysThatFfmpegIsMissing) {
