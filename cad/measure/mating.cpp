@@ -173,15 +173,22 @@ void FindOpenings(const TriangleMesh& tool, const TriangleMesh& target, Mating& 
   mating.opening_high_m = mating.through ? BoundsOf(tool).max().z() : mating.depth_m;
 }
 
-Box MatingBox(const TriangleMesh& tool, const Mating& mating) {
+/// Across: what of the tool is below the rim when it is in, and of the target above where the tool then ends. (A hub is
+/// wider than the shaft that it goes over, a block wider than the plug that it takes.)
+Box MatingBox(const TriangleMesh& tool, const TriangleMesh& target, const Mating& mating) {
   const Box reach = BoundsOf(tool);
   Box box;
   const double margin = std::max(5e-4, 3 * mating.clearance_m.maxCoeff());
-  // Across: what of the tool is below the rim when it is in.
   for (int t = 0; t < tool.size(); ++t) {
     const Box triangle = BoundsOf(tool, t);
     if (triangle.min().z() <= mating.depth_m) box.extend(triangle);
   }
+  Box stands;
+  for (int t = 0; t < target.size(); ++t) {
+    const Box triangle = BoundsOf(target, t);
+    if (triangle.max().z() > kJustInside_m - mating.depth_m) stands.extend(triangle);
+  }
+  box = box.intersection(Box(stands.min().array() - margin, stands.max().array() + margin));
   box.min().z() = -mating.depth_m;
   box.max().z() = std::min(mating.depth_m, reach.max().z());
   for (const SlabLoop& loop : mating.openings) {
@@ -262,7 +269,7 @@ Mating MeasureMating(const TriangleMesh& tool_cad, const TriangleMesh& target_ca
   const MeshTree moved(target);
   MeasureTurns(tool, moved, -mating.depth_m + std::max(seated, 0.02 * mating.depth_m), mating);
   FindOpenings(tool, target, mating);
-  mating.mating_box = MatingBox(tool, mating);
+  mating.mating_box = MatingBox(tool, target, mating);
   return mating;
 }
 

@@ -239,6 +239,13 @@ PartPair KeyedGear(double looser) {
   return {Teeth(20, 13, 15.6, 0, 10) - KeyedRod(c, -1, 11), Block(60, 60, -8, 0) + KeyedRod(0, -1, 18)};
 }
 
+/// A hub over a shaft, with the hole of a set screw through one side of its bore.
+PartPair SetScrew(double looser) {
+  const Shape screw = Turned(Rod(0, 0, 1.6, 0, 20), gp_Dir(0, 1, 0), 90);
+  return {Rod(0, 0, 12, 0, 14) - Rod(0, 0, 4 + 0.1 * looser, -1, 15) - Moved(screw, 0, 0, 7),
+          Block(30, 30, -5, 0) + Rod(0, 0, 4, -1, 18)};
+}
+
 /// A pinion that goes into a ring with teeth inside.
 PartPair RingGear(double looser) {
   const double c = 0.15 * looser;
@@ -340,6 +347,7 @@ PartPair DrawParts(const std::string& kind, double looser) {
       {"short-key", ShortKey},
       {"thin-plate", ThinPlate},
       {"keyed-gear", KeyedGear},
+      {"set-screw", SetScrew},
       {"ring-gear", RingGear},
       {"hexagon", AsDrawn(Hexagon)},
       {"round-pins", AsDrawn(RoundPins)},

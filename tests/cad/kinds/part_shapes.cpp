@@ -118,6 +118,7 @@ std::vector<PartKind> PartKinds() {
                                  {"short-key", 0.1, 0.1, 12.0},
                                  {"thin-plate", 0.1, 0.1, 11.0},
                                  {"keyed-gear", 0.1, 0.1, 18.0, true},
+                                 {"set-screw", 0.1, 0.1, 18.0, true},
                                  {"ring-gear", 0.0, 0.0, 10.0},
                                  {"hexagon", 0.1, 0.1, 11.0},
                                  {"round-pins", 0.15, 0.15, 12.0},
@@ -127,9 +128,10 @@ std::vector<PartKind> PartKinds() {
                                  {"filleted-bore", 0.1, 0.1, 12.0, false, false, true},
                                  {"oblique-bore", 0.1, 0.1, 0.0},
                                  {"oblique-slot", 0.15, 0.15, 0.0}};
-  const std::vector<std::string> scalable = {
-      "keyed",    "d-plug",      "rj45",      "two-pin",    "three-pin",  "tilted",    "chamfered", "chamfered-tee",
-      "assembly", "keyed-shaft", "short-key", "thin-plate", "keyed-gear", "ring-gear", "ellipse",   "filleted"};
+  const std::vector<std::string> scalable = {"keyed",     "d-plug",     "rj45",          "two-pin",   "three-pin",
+                                             "tilted",    "chamfered",  "chamfered-tee", "assembly",  "keyed-shaft",
+                                             "short-key", "thin-plate", "keyed-gear",    "set-screw", "ring-gear",
+                                             "ellipse",   "filleted"};
   for (PartKind& kind : kinds)
     kind.scalable_clearance = std::find(scalable.begin(), scalable.end(), kind.name) != scalable.end();
   return kinds;
