@@ -1,8 +1,11 @@
 #include "feeler/cad/pieces/decompose.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -128,34 +131,100 @@ Slab HalfOf(const Slab& slab, bool upper) {
   return half;
 }
 
+/// A convex polygon between two heights.
+struct Body {
+  SlabLoop polygon;
+  double low_m = 0.0;
+  double high_m = 0.0;
+};
+
 /// The convex bodies of a slab. Where no cut stays plane from end to end, its halves are cut, and their halves.
-void CutSlab(const Slab& slab, double tolerance_m, int halvings, std::vector<ConvexPiece>& pieces) {
+void CutSlab(const Slab& slab, double tolerance_m, int halvings, std::vector<Body>& bodies) {
   const auto polygons = ConvexPartition(slab.loops, tolerance_m, halvings > 0);
   if (!polygons) {
-    CutSlab(HalfOf(slab, false), tolerance_m, halvings - 1, pieces);
-    CutSlab(HalfOf(slab, true), tolerance_m, halvings - 1, pieces);
+    CutSlab(HalfOf(slab, false), tolerance_m, halvings - 1, bodies);
+    CutSlab(HalfOf(slab, true), tolerance_m, halvings - 1, bodies);
     return;
   }
   for (const SlabLoop& polygon : *polygons) {
-    if (Narrowest(polygon) < kSliver_m) continue;
-    std::vector<Eigen::Vector3d> corners;
-    for (const SlabPoint& p : polygon) {
-      corners.emplace_back(p.low.x(), p.low.y(), slab.low_m);
-      corners.emplace_back(p.high.x(), p.high.y(), slab.high_m);
-    }
-    if (auto piece = HullOf(corners)) pieces.push_back(std::move(*piece));
+    if (Narrowest(polygon) >= kSliver_m) bodies.push_back({polygon, slab.low_m, slab.high_m});
   }
+}
+
+/// Bodies as they come from below, where prisms that stand on each other are one.
+class Prisms {
+ public:
+  void Add(Body body) {
+    const auto key = KeyOf(body.polygon);
+    if (key) {
+      const auto [below, fresh] = last_.try_emplace(*key, bodies_.size());
+      if (!fresh && bodies_[below->second].high_m == body.low_m) {
+        bodies_[below->second].high_m = body.high_m;
+        return;
+      }
+      below->second = bodies_.size();
+    }
+    bodies_.push_back(std::move(body));
+  }
+
+  const std::vector<Body>& bodies() const { return bodies_; }
+
+ private:
+  /// The corners of a prism, from the least on, as exactly as files give them; nothing for what is none.
+  static std::optional<std::vector<std::int64_t>> KeyOf(const SlabLoop& polygon) {
+    constexpr double kSame_m = 2.5e-7;  // coordinates in files are of 32 bits
+    std::vector<std::array<std::int64_t, 2>> corners;
+    for (const SlabPoint& p : polygon) {
+      if ((p.low - p.high).norm() > kSame_m) return std::nullopt;
+      corners.push_back({std::llround(p.middle.x() / kSame_m), std::llround(p.middle.y() / kSame_m)});
+    }
+    std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+    std::vector<std::int64_t> key;
+    for (const auto& corner : corners) key.insert(key.end(), corner.begin(), corner.end());
+    return key;
+  }
+
+  std::vector<Body> bodies_;
+  std::map<std::vector<std::int64_t>, std::size_t> last_;  ///< the highest of each polygon
+};
+
+/// A number of convex polygons that none can be less than: one takes away two of the corners that stand in (Chazelle
+/// and Dobkin, Optimal convex decompositions, 1985), a cut to a hole none that another could.
+std::size_t LeastPolygons(const Slab& slab) {
+  std::size_t standing_in = 0;
+  for (const SlabLoop& loop : slab.loops) {
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Eigen::Vector2d in = loop[i].middle - loop[(i + loop.size() - 1) % loop.size()].middle;
+      const Eigen::Vector2d out = loop[(i + 1) % loop.size()].middle - loop[i].middle;
+      if (in.x() * out.y() - in.y() * out.x() < 0) ++standing_in;
+    }
+  }
+  return std::max<std::size_t>(1, standing_in / 2 - std::min(standing_in / 2, slab.loops.size()));
 }
 
 /// The bodies of all slabs; nothing where they are more than `most`.
 std::optional<std::vector<ConvexPiece>> Elementary(const std::vector<Slab>& slabs, const DecomposeOptions& options,
                                                    std::size_t most) {
   constexpr int kMostHalvings = 6;
+  std::size_t least = 0;
+  for (const Slab& slab : slabs) least = std::max(least, LeastPolygons(slab));
+  if (least > most) return std::nullopt;
   const double tolerance_m = 0.5 * std::min(options.tolerance_near_m, options.tolerance_far_m);
-  std::vector<ConvexPiece> pieces;
+  Prisms prisms;
   for (const Slab& slab : slabs) {
-    CutSlab(slab, tolerance_m, kMostHalvings, pieces);
-    if (pieces.size() > most) return std::nullopt;
+    std::vector<Body> bodies;
+    CutSlab(slab, tolerance_m, kMostHalvings, bodies);
+    for (Body& body : bodies) prisms.Add(std::move(body));
+    if (prisms.bodies().size() > most) return std::nullopt;
+  }
+  std::vector<ConvexPiece> pieces;
+  for (const Body& body : prisms.bodies()) {
+    std::vector<Eigen::Vector3d> corners;
+    for (const SlabPoint& p : body.polygon) {
+      corners.emplace_back(p.low.x(), p.low.y(), body.low_m);
+      corners.emplace_back(p.high.x(), p.high.y(), body.high_m);
+    }
+    if (auto piece = HullOf(corners)) pieces.push_back(std::move(*piece));
   }
   return pieces;
 }
@@ -175,9 +244,8 @@ double ColumnShare(const Box& a, const Box& b) {
 class Merger {
  public:
   Merger(std::vector<ConvexPiece> pieces, const MeshTree& solid, const DecomposeOptions& options)
-      : pieces_(std::move(pieces)), solid_(solid), options_(options), body_(pieces_.size()) {
+      : pieces_(std::move(pieces)), solid_(solid), options_(options), body_(pieces_.size()), never_(pieces_.size()) {
     std::iota(body_.begin(), body_.end(), std::size_t{0});
-    bodies_ = pieces_.size();
   }
 
   std::vector<ConvexPiece> Run() {
@@ -193,53 +261,83 @@ class Merger {
  private:
   /// Unites pieces with the next that they take; `grow`: with as many as they take.
   bool Pass(double least_share, bool grow) {
+    const auto low = [](const ConvexPiece& piece) { return piece.bounds.min().z(); };
+    const bool from_below = std::is_sorted(pieces_.begin(), pieces_.end(), [&](const auto& a, const auto& b) {
+      return low(a) < low(b);  // as slices come: none is looked for above the piece
+    });
+    std::vector<bool> gone(pieces_.size(), false);
     bool any = false;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      if (gone[i]) continue;
       for (std::size_t j = i + 1; j < pieces_.size();) {
-        if (Near(pieces_[i].bounds, pieces_[j].bounds) &&
+        if (from_below && low(pieces_[j]) > pieces_[i].bounds.max().z() + kLevel_m) break;
+        if (!gone[j] && Near(pieces_[i].bounds, pieces_[j].bounds) &&
             ColumnShare(pieces_[i].bounds, pieces_[j].bounds) >= least_share && Unite(i, j)) {
           any = true;
+          gone[j] = true;
           j = grow ? i + 1 : pieces_.size();
         } else {
           ++j;
         }
       }
     }
+    Remove(gone);
     return any;
   }
 
+  void Remove(const std::vector<bool>& gone) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      if (gone[i]) continue;
+      if (kept < i) {
+        pieces_[kept] = std::move(pieces_[i]);
+        body_[kept] = body_[i];
+      }
+      ++kept;
+    }
+    pieces_.resize(kept);
+    body_.resize(kept);
+  }
+
+  /// The first of two is then both.
   bool Unite(std::size_t i, std::size_t j) {
-    if (apart_.contains({body_[i], body_[j]})) return false;
-    auto hull = OneBody(pieces_[i], pieces_[j]);
-    if (!hull) {
-      apart_.insert({body_[i], body_[j]});
+    const std::size_t a = body_[i];
+    const std::size_t b = body_[j];
+    if (never_[a].contains(b) || apart_.contains({a, b})) return false;
+    std::vector<Eigen::Vector3d> points = pieces_[i].surface.points;
+    points.insert(points.end(), pieces_[j].surface.points.begin(), pieces_[j].surface.points.end());
+    auto hull = HullOf(points);
+    const bool inside = hull && StaysInside(*hull, solid_, options_);
+    // A hull that leaves the solid does so with more in it, too; but what a thin one may is less.
+    if (hull && !inside && !IsThin(*hull, options_)) {
+      never_[a].insert(b);
+      never_[b].insert(a);
+      return false;
+    }
+    if (!inside || !IsLittleMore(*hull, pieces_[i], pieces_[j])) {
+      apart_.insert({a, b});
       return false;
     }
     pieces_[i] = std::move(*hull);
-    body_[i] = bodies_++;
-    pieces_.erase(pieces_.begin() + static_cast<std::ptrdiff_t>(j));
-    body_.erase(body_.begin() + static_cast<std::ptrdiff_t>(j));
+    body_[i] = never_.size();
+    std::set<std::size_t> never = never_[a];
+    never.insert(never_[b].begin(), never_[b].end());
+    for (const std::size_t other : never) never_[other].insert(body_[i]);
+    never_.push_back(std::move(never));
     return true;
   }
 
-  /// The hull of two where it is little more than both and stays in the solid.
-  std::optional<ConvexPiece> OneBody(const ConvexPiece& a, const ConvexPiece& b) const {
-    std::vector<Eigen::Vector3d> points = a.surface.points;
-    points.insert(points.end(), b.surface.points.begin(), b.surface.points.end());
-    auto hull = HullOf(points);
-    if (!hull) return std::nullopt;
-    const double more = hull->volume - a.volume - b.volume;
-    const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull->surface) +
+  bool IsLittleMore(const ConvexPiece& hull, const ConvexPiece& a, const ConvexPiece& b) const {
+    const double allowed = 2 * std::max(options_.tolerance_near_m, options_.tolerance_far_m) * AreaOf(hull.surface) +
                            2e-3 * (a.volume + b.volume);
-    if (more > allowed || !StaysInside(*hull, solid_, options_)) return std::nullopt;
-    return hull;
+    return hull.volume - a.volume - b.volume <= allowed;
   }
 
   std::vector<ConvexPiece> pieces_;
   const MeshTree& solid_;
   const DecomposeOptions& options_;
   std::vector<std::size_t> body_;  ///< of each piece: its number, never used again when it is united with another
-  std::size_t bodies_ = 0;
+  std::vector<std::set<std::size_t>> never_;             ///< of each body: those that no body of both can be with
   std::set<std::pair<std::size_t, std::size_t>> apart_;  ///< pairs that were tried in vain
 };
 
@@ -255,10 +353,13 @@ std::optional<std::vector<ConvexPiece>> DecomposeIfFew(const TriangleMesh& solid
   const MeshTree tree(solid);
   if (auto hull = HullOf(solid.points); hull && StaysInside(*hull, tree, options))
     return std::vector<ConvexPiece>{std::move(*hull)};
-  const bool free_form = static_cast<int>(LevelsOf(solid, kLevel_m).size()) > options.most_slabs + 1;
+  const int levels = static_cast<int>(LevelsOf(solid, kLevel_m).size());
+  const bool free_form = levels > options.most_slabs + 1;
   constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
-  if (!free_form || most_pieces == kAny) {
-    if (auto bodies = Elementary(SlabsOf(solid, options, 0.5), options, most_bodies)) {
+  if (levels <= options.most_levels || most_pieces == kAny) {
+    DecomposeOptions all_levels = options;
+    if (most_pieces != kAny) all_levels.most_slabs = options.most_levels;
+    if (auto bodies = Elementary(SlabsOf(solid, all_levels, 0.5), options, most_bodies)) {
       std::vector<ConvexPiece> pieces = Merger(std::move(*bodies), tree, options).Run();
       if (pieces.size() <= most_pieces) return pieces;
     }

@@ -13,6 +13,7 @@ struct DecomposeOptions {
   Box mating;                      ///< where tool and target mate; the slabs are cut across z
   double tolerance_near_m = 1e-6;  ///< of the surface in the box
   double tolerance_far_m = 1e-6;   ///< elsewhere
+  int most_levels = 640;           ///< beyond it, a free form is not sliced at all of its heights
   int most_slabs = 160;            ///< beyond it, slabs of a free form are drawn together
   bool rough = true;  ///< a column that no hull fits however it is halved is taken as it comes; else none is
 };

@@ -9,13 +9,15 @@
 namespace feeler::cad {
 namespace {
 
+constexpr double kThinShare = 0.2;
+
 /// How deep a surface may enter a hull. Of a thin hull nothing would be left to enter: it could close a hole.
 struct Depths {
   double tight_m;  ///< anywhere
   double loose_m;  ///< outside of where the parts mate
 
   Depths(const ConvexPiece& hull, const DecomposeOptions& options) {
-    const double thin = 0.2 * hull.bounds.sizes().minCoeff();
+    const double thin = kThinShare * hull.bounds.sizes().minCoeff();
     loose_m = std::min(thin, std::max(options.tolerance_near_m, options.tolerance_far_m));
     tight_m = std::min({thin, options.tolerance_near_m, options.tolerance_far_m});
   }
@@ -38,6 +40,10 @@ std::optional<Planes> PlanesThrough(const Box& box, const Planes& planes, const 
 }
 
 }  // namespace
+
+bool IsThin(const ConvexPiece& hull, const DecomposeOptions& options) {
+  return kThinShare * hull.bounds.sizes().minCoeff() < std::max(options.tolerance_near_m, options.tolerance_far_m);
+}
 
 bool StaysInside(const ConvexPiece& hull, const MeshTree& solid, const DecomposeOptions& options) {
   const Depths depths(hull, options);

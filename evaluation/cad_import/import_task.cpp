@@ -33,7 +33,8 @@ constexpr double kLargestPart_m = 1.0;
 constexpr double kSmallestPart_m = 2e-4;
 constexpr std::size_t kMostPieces = 64;
 constexpr std::size_t kMostPiecesOfBore = 512;
-constexpr std::size_t kMostBodies = 8;  ///< for each piece that there may be
+constexpr std::size_t kMostBodiesOfPiece = 64;  ///< for each piece that there may be
+constexpr std::size_t kMostBodies = 24000;      ///< before they are united: some seconds
 constexpr double kLargestFarDeviation_m = 5e-4;
 constexpr int kSamples = 100'000;
 
@@ -162,47 +163,59 @@ void MakePieces(const cad::Mating& mating, const Pose& frame_T_cad, const std::s
   for (const auto& [share, far_m] : {std::pair{0.2, 1e-5}, {0.5, 5e-5}, {0.7, 1e-4}, {0.9, 2e-4}, {0.9, 4e-4}}) {
     ladder.push_back({std::max(1e-6, share * budget), std::max(1e-6, far_m)});
   }
-  const auto cut = [&](const Tolerances& step, bool rough) {
-    const bool last = &step == &ladder.back();
+  struct Cut {
+    std::vector<cad::ConvexPiece> pieces;
+    Tolerances within;
+  };
+  std::vector<cad::TriangleMesh> solids;
+  for (const cad::TriangleMesh& solid : part.checked.solids) solids.push_back(cad::Transformed(solid, frame_T_cad));
+  const auto cut = [&](const Tolerances& within, bool rough, std::size_t most_pieces) -> std::optional<Cut> {
     cad::DecomposeOptions decompose;
     decompose.mating = mating.mating_box;
-    decompose.tolerance_near_m = step.near_m;
-    decompose.tolerance_far_m = step.far_m;
+    decompose.tolerance_near_m = within.near_m;
+    decompose.tolerance_far_m = within.far_m;
     decompose.rough = rough;
     // Slices of so many bodies seldom unite to few enough, and it takes long to see that.
-    const std::size_t most_bodies = kMostBodies * (last ? kMostPiecesOfBore : most);
-    const std::size_t most_pieces = last ? most_bodies : most;
-    part.pieces.clear();
-    part.tolerance_near_m = step.near_m;
-    part.tolerance_far_m = step.far_m;
-    for (const cad::TriangleMesh& solid : part.checked.solids) {
-      auto pieces = cad::DecomposeIfFew(cad::Transformed(solid, frame_T_cad), decompose, most_bodies, most_pieces);
-      if (!pieces) return false;
-      for (cad::ConvexPiece& piece : *pieces) part.pieces.push_back(std::move(piece));
+    const std::size_t most_bodies = std::min(kMostBodies, kMostBodiesOfPiece * most_pieces);
+    Cut whole{{}, within};
+    for (const cad::TriangleMesh& solid : solids) {
+      auto pieces = cad::DecomposeIfFew(solid, decompose, most_bodies, most_pieces);
+      if (!pieces) return std::nullopt;
+      for (cad::ConvexPiece& piece : *pieces) whole.pieces.push_back(std::move(piece));
     }
-    return true;
+    return whole.pieces.size() <= most_pieces ? std::optional(std::move(whole)) : std::nullopt;
   };
-  // What leaves the tolerances only where nothing stays within them: it may do.
-  bool found = false;
-  for (const bool rough : {false, true}) {
-    for (const Tolerances& step : ladder) {
-      found = cut(step, rough);
-      if (found && part.pieces.size() <= most) break;
+  // What takes too many pieces within some tolerances takes too many within finer ones.
+  const auto finest = [&](bool rough, std::size_t most_pieces) {
+    std::optional<Cut> best = cut(ladder.front(), rough, most_pieces);
+    std::size_t low = 1;
+    std::size_t high = best ? low : ladder.size();
+    while (low < high) {
+      const std::size_t step = low + (high - low) / 2;
+      if (auto coarser = cut(ladder[step], rough, most_pieces)) {
+        best = std::move(coarser);
+        high = step;
+      } else {
+        low = step + 1;
+      }
     }
-    if (found && part.pieces.size() <= (rough ? kMostPiecesOfBore : most)) break;
-  }
-  FewerCorners(mating, budget, part);
+    return best;
+  };
+  // Rather more pieces than some that leave the tolerances; but those may do.
+  std::optional<Cut> found = finest(false, most);
+  if (!found && most < kMostPiecesOfBore) found = finest(false, kMostPiecesOfBore);
+  if (!found) found = finest(true, most);
+  if (!found) found = cut(ladder.back(), true, kMostPiecesOfBore);
   if (!found) {
     throw InputError(fmt::format("{} ({})", role, part.file),
                      fmt::format("needs more than {} convex pieces", kMostPiecesOfBore),
                      "leave out what does not mate: threads, engravings, small fillets");
   }
+  part.pieces = std::move(found->pieces);
+  part.tolerance_near_m = found->within.near_m;
+  part.tolerance_far_m = found->within.far_m;
+  FewerCorners(mating, budget, part);
   if (part.pieces.empty()) throw InputError(role, "no convex piece has a volume", "is the part thinner than 2 um?");
-  if (part.pieces.size() > kMostPiecesOfBore) {
-    throw InputError(fmt::format("{} ({})", role, part.file),
-                     fmt::format("needs {} convex pieces, more than {}", part.pieces.size(), kMostPiecesOfBore),
-                     "leave out what does not mate: threads, engravings, small fillets");
-  }
 }
 
 void MeasureDeviation(const cad::Mating& mating, const std::string& role, const ImportOptions& options,
