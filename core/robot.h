@@ -31,7 +31,9 @@ struct GuardedMotion {
 
 /// A compliant motion of the tool reference through way points (Cartesian impedance).
 struct CompliantMotion {
-  std::vector<Pose> world_T_tool;  ///< way points, at least one
+  /// Way points, at least one. A first of several that is where the compliant motion just before was to end: this one
+  /// goes on from there, pressed as the tool is, and not from where it stands.
+  std::vector<Pose> world_T_tool;
   double speed_m_s = 0.02;
   double force_limit_n = 60.0;  ///< on the filtered wrench
   double time_limit_s = 10.0;

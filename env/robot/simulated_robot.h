@@ -93,6 +93,7 @@ struct RobotMemory {
   double peak_force_n = 0.0;                ///< exact, since the motion began
   double deadline_s = std::numeric_limits<double>::infinity();
   std::optional<TwistReference> twist_reference{};
+  std::optional<TwistReference> compliant_end{};  ///< where and when a compliant motion came to its end
 };
 
 /// Everything that later calls depend on: restored, the robot goes on bit for bit.
@@ -227,6 +228,8 @@ class SimulatedRobot : public Robot {
   double PathDone(const Pose& start, const Eigen::Vector3d& direction, const Pose& now) const;
   /// Where the joints have the tool, a wrist at rest: what the controllers know.
   const Pose& ArmPose() const { return frame_.pose; }
+  /// Whether a compliant motion begins where the last one ended just now.
+  bool GoesOn(const std::vector<Pose>& way_points) const;
   Pose MeasuredTool(const JointVector& q_rad) const { return ToolForwardKinematics(world_.scene(), q_rad); }
 
   RobotOptions options_;

@@ -9,6 +9,13 @@
 
 namespace feeler::env {
 
+bool SimulatedRobot::GoesOn(const std::vector<Pose>& way_points) const {
+  constexpr double kSame = 1e-6;
+  const auto& end = memory_.compliant_end;
+  return way_points.size() > 1 && end && end->time_s == world_.time_s() &&
+         (way_points.front().matrix() - end->world_T_tool.matrix()).norm() < kSame;
+}
+
 MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
   if (motion.world_T_tool.empty()) throw InputError("compliant motion", "no way points", "give at least one pose");
   for (const Pose& pose : motion.world_T_tool) RequirePose(pose, "compliant motion");
@@ -25,7 +32,8 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
   return Guard([&] {
     const Pose start = ToolPose();
     std::vector<Pose> way_points = motion.world_T_tool;
-    way_points.insert(way_points.begin(), ArmPose());
+    if (!GoesOn(way_points)) way_points.insert(way_points.begin(), ArmPose());
+    memory_.compliant_end.reset();
     CartesianLimits limits;
     limits.speed_m_s = motion.speed_m_s;
     limits.acceleration_m_s2 = options_.acceleration_m_s2;
@@ -77,6 +85,9 @@ MotionResult SimulatedRobot::Compliant(const CompliantMotion& motion) {
     result.travelled_m = way_points.size() == 2 && way.norm() > 1e-9
                              ? (result.world_T_tool.translation() - start.translation()).dot(way.normalized())
                              : memory_.statistics.path_length_m - path_before_m;
+    if (result.reason == StopReason::kReached || result.reason == StopReason::kContact) {
+      memory_.compliant_end = TwistReference{world_.time_s(), goal, Vector6::Zero()};
+    }
     if (result.reason == StopReason::kForceLimit || result.reason == StopReason::kAborted) Hold(result);
     return result;
   });

@@ -327,11 +327,13 @@ MotionReport Mover::Insert(const Eigen::Vector3d& target, std::optional<double> 
   return Finish(robot_.Compliant(motion), target, "insert", {}, false);
 }
 
-MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind) {
+MotionReport Mover::Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind,
+                          std::optional<double> stiffness_n_m) {
   CheckLimits();
   CompliantMotion motion;
   for (const Eigen::Vector3d& place : way_points) motion.world_T_tool.push_back(frame_.ToWorld(place));
   motion.speed_m_s = speed_m_s;
+  if (stiffness_n_m) motion.stiffness_n_m.z() = *stiffness_n_m;
   motion.force_limit_n = std::min(options_.insertion_force_limit_n, kPressShare * options_.force_budget_n);
   const MotionReport report = Finish(robot_.Compliant(motion), way_points.back(), kind, {}, false);
   position_ = report.end;  // what it is pressed against, not the command, says where it is

@@ -96,8 +96,10 @@ class Mover {
   /// How fast the tool may meet a wall in this direction (unit vector, lattice axes) as it stands, m/s; one that holds
   /// it along its length if `held`.
   double SpeedInto(const Eigen::Vector3d& direction, bool held = false) const;
-  /// Compliantly through way points, pressing on what is under the tool.
-  MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind);
+  /// Compliantly through way points, pressing on what is under the tool; `stiffness_n_m` along the tool's axis where it
+  /// is not a compliant motion's own.
+  MotionReport Press(const std::vector<Eigen::Vector3d>& way_points, double speed_m_s, const std::string& kind,
+                     std::optional<double> stiffness_n_m = {});
   /// Follows a velocity, watched for contact. Motions one after the other are one in the record, of kind "servo".
   MotionReport Follow(const TwistMotion& motion);
   /// What is felt explains whatever a way has met: the ways from here on are known again.

@@ -258,7 +258,7 @@ constexpr Setting kSettings[] = {
 constexpr double kSpiralPressN = 20.0;
 /// With that press a tool sinks into the opening as if it fell with this acceleration, m/s^2: what the fastest spiral
 /// without misses on the plug's socket comes to, and on the tight one too.
-constexpr double kSinkingMS2 = 6.4;
+constexpr double kSinkingMS2 = 1.3;
 /// Half widths of the uncertainty, in tolerances, up to which a spiral is quicker than touch (`feeler experiment
 /// baselines`: 6 mm on the plug at 1 mm; nowhere on the tight socket, whose smallest problem is 6.7 wide).
 constexpr double kSpiralReach = 6.0;
