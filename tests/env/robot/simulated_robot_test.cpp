@@ -76,6 +76,30 @@ TEST_F(SimulatedRobotTest, TransferIntoAnUnknownObstacleIsAProtectiveStop) {
   EXPECT_NEAR((target_.inverse() * robot_.ToolPose()).translation().x(), kWallX_m, 0.01);
 }
 
+TEST_F(SimulatedRobotTest, ACompliantMotionGoesOnAsThePressedToolIs) {
+  Place({0.02, 0.02, 0.004});
+  CompliantMotion press;
+  press.world_T_tool = {ToolAt(*scene_, {0.02, 0.02, -0.003})};
+  press.stiffness_n_m.z() = 4000.0;
+  ASSERT_EQ(robot_.Compliant(press).reason, StopReason::kContact);
+  const double pressed_n = robot_.ContactWrench().force_n.z();
+  ASSERT_GT(pressed_n, 8.0);
+  const RobotState state = robot_.Save();
+  const Pose aside = ToolAt(*scene_, {0.021, 0.02, -0.003});
+  const auto least_force_n = [&](const std::vector<Pose>& way_points) {
+    robot_.Restore(state);
+    double least_n = pressed_n;
+    robot_.SetObserver([&](const World&) { least_n = std::min(least_n, robot_.sensor().filtered().force_n.z()); }, 0.0);
+    CompliantMotion motion = press;
+    motion.world_T_tool = way_points;
+    EXPECT_EQ(robot_.Compliant(motion).reason, StopReason::kContact);
+    robot_.SetObserver({}, 0.0);
+    return least_n;
+  };
+  EXPECT_GT(least_force_n({press.world_T_tool.back(), aside}), 0.5 * pressed_n);
+  EXPECT_LT(least_force_n({aside}), 0.5 * pressed_n) << "from where the tool stands it is pressed anew";
+}
+
 TEST_F(SimulatedRobotTest, SensorReadsWhatInverseDynamicsDemands) {
   // Pressed on the rim off-centre, at rest: the joint torques beyond gravity are the contact wrench's.
   Place({0.02, 0.02, 0.004});

@@ -1,5 +1,6 @@
 // Laws of a spiral on a face without an opening: it presses with what is asked for, but no more than half of the force
-// budget, and goes no faster than the budget allows across; it finds nothing.
+// budget, goes across with half of the speed that the budget allows, and each of its motions begins where the one
+// before was to end; it finds nothing.
 #include "feeler/execution/contact/spiral_search.h"
 
 #include <gtest/gtest.h>
@@ -30,11 +31,19 @@ class FaceRobot final : public Robot {
   MotionResult Compliant(const CompliantMotion& motion) override {
     for (const Pose& pose : motion.world_T_tool) deepest_m = std::max(deepest_m, -pose.translation().z());
     fastest_m_s = std::max(fastest_m_s, motion.speed_m_s);
+    stiffness_n_m = motion.stiffness_n_m.z();
+    if (motion.world_T_tool.size() > 1) {
+      EXPECT_LT((motion.world_T_tool.front().translation() - commanded_.translation()).norm(), 1e-9);
+      ++going_on;
+    }
+    commanded_ = motion.world_T_tool.back();
     return Go(motion.world_T_tool.back());
   }
 
   double deepest_m = 0.0;
   double fastest_m_s = 0.0;
+  double stiffness_n_m = 0.0;
+  int going_on = 0;
 
  private:
   MotionResult Go(const Pose& goal) {
@@ -49,11 +58,11 @@ class FaceRobot final : public Robot {
   }
 
   Pose pose_ = Pose::Identity();
+  Pose commanded_ = Pose::Identity();
   double time_s_ = 0.0;
 };
 
 TEST(SpiralSearch, KeepsPressAndSpeedWithinTheBudget) {
-  constexpr double kStiffness_n_m = 4000.0;
   policies::SpiralSearch search;
   search.radius_m = 0.004;
   search.pitch_m = 0.001;
@@ -68,8 +77,10 @@ TEST(SpiralSearch, KeepsPressAndSpeedWithinTheBudget) {
     ExecutionRecord record;
     Mover mover(robot, frame, Direction::kMinusZ, options, record, 0.0);
     EXPECT_FALSE(FindBySpiral(Task{}, Eigen::Vector3d::Zero(), search, mover));
-    EXPECT_NEAR(kStiffness_n_m * robot.deepest_m, std::min(20.0, 0.5 * budget_n), 1e-6) << budget_n;
-    EXPECT_NEAR(robot.fastest_m_s, std::min(0.08, SpeedWithinBudget(ContactResponse{}, budget_n)), 1e-9) << budget_n;
+    EXPECT_NEAR(robot.stiffness_n_m * robot.deepest_m, std::min(20.0, 0.5 * budget_n), 1e-6) << budget_n;
+    EXPECT_NEAR(robot.fastest_m_s, std::min(0.08, 0.5 * SpeedWithinBudget(ContactResponse{}, budget_n)), 1e-9)
+        << budget_n;
+    EXPECT_GE(robot.going_on, 8) << budget_n;  // four turns
   }
 }
 
