@@ -57,7 +57,7 @@ std::optional<SpiralFind> FindBySpiral(const Task& task, const Eigen::Vector3d& 
       std::min({search.speed_m_s, kShareAcross * mover.SpeedInto(u), kShareAcross * mover.SpeedInto(v)});
   const double pressed = height + SignOf(task.insertion) * mover.Cells(press_n / kStiffness_n_m);
   const int points = static_cast<int>(search.radius_m / search.pitch_m * kPerTurn);
-  const double press_speed_m_s = kPressSpeed * mover.SpeedInto(inward);
+  const double press_speed_m_s = std::min(search.speed_m_s, kPressSpeed * mover.SpeedInto(inward));
   std::optional<Eigen::Vector3d> commanded;  // what the tool is pressed with; nothing when it had to be stopped
   std::vector<Eigen::Vector3d> way;
   double farthest = 0.0;
