@@ -34,7 +34,7 @@ constexpr double kSmallestPart_m = 2e-4;
 constexpr std::size_t kMostPieces = 64;
 constexpr std::size_t kMostPiecesOfBore = 512;
 constexpr std::size_t kMostBodiesOfPiece = 64;  ///< for each piece that there may be
-constexpr std::size_t kMostBodies = 24000;      ///< before they are united: some seconds
+constexpr std::size_t kMostBodies = 12000;      ///< before they are united: some seconds
 constexpr double kLargestFarDeviation_m = 5e-4;
 constexpr int kSamples = 100'000;
 
