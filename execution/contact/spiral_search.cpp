@@ -9,7 +9,7 @@ namespace feeler::execution {
 namespace {
 
 /// The tool has dropped into the opening, not just over an unevenness: of how deep it is pressed.
-constexpr double kDrop = 0.5;
+constexpr double kDrop = 0.25;
 /// Stiffness along the insertion with which it is pressed, N/m. Softer it would drop faster: at 4000 N/m walls and
 /// edges of the plug's socket are met with 98 N, at 8000 with 59, and at 16000 a third of the openings are missed.
 constexpr double kStiffness_n_m = 8000.0;

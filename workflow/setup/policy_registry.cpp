@@ -253,15 +253,15 @@ constexpr Setting kSettings[] = {
     {"hybrid-threshold", [](PolicyOptions& o, double v) { o.hybrid_threshold_m = v; }},
 };
 
-/// The press of a spiral search: at 10 N friction and chamfer hold half of the tools back, at 40 N friction slows all
-/// (`feeler experiment spiral-tuning`, on both sockets).
+/// The press of a spiral search, where the force budget allows it: half of that at most. With less, friction and
+/// chamfer hold tools back (`feeler experiment spiral-tuning`, on both sockets).
 constexpr double kSpiralPressN = 20.0;
-/// With that press a tool sinks into the opening as if it fell with this acceleration, m/s^2: what the fastest spiral
-/// without misses on the plug's socket comes to, and on the tight one too.
+/// Pressed with half of the budget of 25 N a tool sinks into the opening as if it fell with this acceleration, m/s^2:
+/// the fastest spiral that finds nearly all openings of the tight socket goes 20 mm/s.
 constexpr double kSinkingMS2 = 1.3;
 /// Half widths of the uncertainty, in tolerances, up to which a spiral is quicker than touch (`feeler experiment
-/// baselines`: 6 mm on the plug at 1 mm; nowhere on the tight socket, whose smallest problem is 6.7 wide).
-constexpr double kSpiralReach = 6.0;
+/// baselines`: 3 mm, but not 5, on the plug at 1 mm; nowhere on the tight socket, whose smallest problem is 6.7 wide).
+constexpr double kSpiralReach = 4.0;
 
 }  // namespace
 

@@ -50,7 +50,7 @@ PolicyOptions ParsePolicyOptions(const std::vector<std::string>& settings);
 /// pass every place within one, and the tool sinks in while it crosses that width (under a constant press the time
 /// grows as its root, so the speed does). docs/experiments.md holds the measurements.
 policies::SpiralTuning DerivedSpiral(const Task& task);
-/// Below this half width of the uncertainty `hybrid` spirals: six lateral tolerances.
+/// Below this half width of the uncertainty `hybrid` spirals: four lateral tolerances.
 double DerivedHybridThreshold(const Task& task);
 
 /// How a policy is made, and what it asks for.
