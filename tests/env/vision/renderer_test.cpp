@@ -151,12 +151,17 @@ Image Frame(int width, int height, int shade) {
           std::vector<std::uint8_t>(static_cast<std::size_t>(3 * width * height), static_cast<std::uint8_t>(shade))};
 }
 
-TEST(Video, IsPlayableAndComplete) {
-  const TemporaryFolder folder("feeler_video_written");
-  const std::string path = folder / "a 'b' $c.mp4";  // no shell is between us and the name
+VideoOptions SmallVideo() {
   VideoOptions options;
   options.width = 64;
   options.height = 48;
+  return options;
+}
+
+TEST(Video, IsPlayableAndComplete) {
+  const TemporaryFolder folder("feeler_video_written");
+  const std::string path = folder / "a 'b' $c.mp4";  // no shell is between us and the name
+  const VideoOptions options = SmallVideo();
   VideoWriter video(path, options);
   for (int i = 0; i < 12; ++i) video.Add(Frame(64, 48, 20 * i));
   EXPECT_FALSE(std::filesystem::exists(path));
@@ -179,9 +184,7 @@ TEST(Video, IsPlayableAndComplete) {
 
 TEST(Video, LeavesNothingBehindWhenItIsNotFinished) {
   const TemporaryFolder folder("feeler_video_unfinished");
-  VideoOptions options;
-  options.width = 64;
-  options.height = 48;
+  VideoOptions options = SmallVideo();
   {
     VideoWriter video(folder / "a.mp4", options);
     video.Add(Frame(64, 48, 100));
@@ -201,9 +204,7 @@ TEST(Video, LeavesNothingBehindWhenItIsNotFinished) {
 // An encoder that comes to its output late must not make anew what a signal has taken away.
 TEST(Video, IsNotMadeAnewAfterASignalTookItAway) {
   const TemporaryFolder folder("feeler_video_signalled");
-  VideoOptions options;
-  options.width = 64;
-  options.height = 48;
+  const VideoOptions options = SmallVideo();
   {
     VideoWriter video(folder / "a.mp4", options);
     SettleOutputsInSignalHandler();
