@@ -192,7 +192,7 @@ void PomdpFlags::AddTo(CLI::App& command) {
   AddInteger(command, "--levels", levels, 0, 1000000,
              "with --pomdp: levels of RTDP-Bel's discretisation of beliefs; 0: none");
   AddInteger(command, "--simulate", simulate, 0, 100000000,
-             "with --pomdp: episodes of RTDP-Bel's greedy policy to simulate afterwards");
+             "with --pomdp: episodes of RTDP-Bel's controller to simulate afterwards");
   command.add_option("--experience", experience,
                      "with --pomdp and e-rtdp-bel: policy (.json) of a similar problem with the same actions and "
                      "observations");

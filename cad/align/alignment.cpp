@@ -149,7 +149,7 @@ std::string InMillimetres(const Eigen::Vector3d& p) {
       fmt::format("do not fit: the nearest is {:.3f} x {:.3f} mm for a hole of {:.3f} x {:.3f} mm, {:.3f} mm too wide",
                   1000 * miss.inner.x(), 1000 * miss.inner.y(), 1000 * miss.hole.x(), 1000 * miss.hole.y(),
                   1000 * miss.too_wide_m),
-      "check the sizes and the --unit");
+      "check the sizes and the --unit; where the hole is open at a side, give the assembled poses: --aligned");
 }
 
 /// Of ways that differ by a small turn alone, that with the most play: the others are it, turned as far as play allows.

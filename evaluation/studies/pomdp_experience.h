@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,8 @@ struct PomdpFamily {
   std::string name;
   std::vector<planner::Pomdp> members;
   std::vector<double> epsilons;  ///< inflations of the heuristic, in costs to the goal
+  int levels = 0;                ///< of the discretisation; 0: the protocol's
+  std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();  ///< a search, beside the protocol's
 };
 
 struct PomdpExperienceProtocol {

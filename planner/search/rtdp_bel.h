@@ -14,6 +14,15 @@
 
 namespace feeler::planner {
 
+/// A model whose numbers may stand for several beliefs (RTDP-Bel's discretisation). Restart() enters the start belief,
+/// Enter(action, k) the one behind the k-th listed outcome of an action; from then on Actions are those of the belief
+/// entered last.
+template <class Model>
+concept SharesValues = requires(Model& model, std::uint32_t k) {
+  { model.Restart() } -> std::convertible_to<std::uint32_t>;
+  { model.Enter(*model.Actions(k).begin(), k) } -> std::convertible_to<std::uint32_t>;
+};
+
 /// RTDP-Bel (Algorithm 1 of the paper) with a sound convergence test.
 ///
 /// `initial(b)` gives the value of a belief when it is met first: epsilon * heur(b) for RTDP-Bel, heur^E(b) for
@@ -25,6 +34,8 @@ namespace feeler::planner {
 /// V(b) = C(b,a) + sum P V(b'), so the frozen policy is acyclic where beliefs only shrink, as in lattice problems (a
 /// cycle would cost nothing), and costs V(b) <= epsilon V*(b), up to rounding; in general POMDPs it may return to a
 /// belief. The labelling procedure is LRTDP's CheckSolved (Bonet and Geffner 2003).
+///
+/// Models whose beliefs stand for several (SharesValues) have a second stage, RunExactly.
 ///
 /// Beside V the algorithm keeps L, started at heur and never inflated, backed up with the same actions: a lower bound
 /// at any time.
@@ -48,12 +59,33 @@ class RtdpBel {
         if (const auto why = stop(expansions_)) return why;
         const Backup best = Update(b);  // lines 5-7
         trial.push_back(b);
-        if (best.action < 0) break;           // a dead end, of infinite value
-        b = SampleSuccessor(b, best.action);  // lines 3, 8-10
+        if (best.action < 0) break;                  // a dead end, of infinite value
+        b = SampleSuccessor(b, best.action).belief;  // lines 3, 8-10
       }
       while (!trial.empty() && CheckSolved(trial.back(), stop)) trial.pop_back();
     }
     return std::nullopt;
+  }
+
+  /// Algorithm 1 with values shared and beliefs that are not: the table is of d(b), trials and backups are of b itself
+  /// (Bonet and Geffner 2009), so that evidence too weak to change d(b) adds up within a trial. Goes on from the values
+  /// that are there, without labels. Values of beliefs that share one go on changing for ever, so it ends when the mean
+  /// value of the start belief over 2 n trials is that over the n before, up to `tolerance` (n = `window`, then twice
+  /// as many, and so on), which proves nothing, or with what `stop(expansions)` says.
+  template <class Stop>
+  requires SharesValues<Model> std::optional<SolverStatus> RunExactly(double tolerance, int window, Stop stop) {
+    for (State& node : nodes_) node.solved = false;
+    double before = std::numeric_limits<double>::infinity();
+    for (std::int64_t trials = window;; trials *= 2) {
+      double sum = 0.0;
+      for (std::int64_t i = 0; i < trials; ++i) {
+        if (const auto why = TrialExactly(stop)) return why;
+        sum += Value(model_.Start());
+      }
+      const double mean = sum / static_cast<double>(trials);
+      if (!(std::abs(mean - before) > tolerance)) return std::nullopt;  // dead ends have no mean
+      before = mean;
+    }
   }
 
   bool Solved(Belief b) const { return b < nodes_.size() && nodes_[b].solved; }
@@ -61,6 +93,8 @@ class RtdpBel {
   int Action(Belief b) const { return nodes_[b].action; }
   /// Value and lower bound times the weight of the belief.
   double Value(Belief b) { return Node(b).value; }
+  /// True if it was backed up: its value is not just what it was met with.
+  bool Updated(Belief b) const { return b < nodes_.size() && nodes_[b].updated; }
   double Lower(Belief b) { return Node(b).lower; }
   std::int64_t expansions() const { return expansions_; }
   std::int64_t trials() const { return trials_; }
@@ -76,12 +110,31 @@ class RtdpBel {
     std::int32_t action = -1;
     bool known = false;
     bool solved = false;
+    bool updated = false;
     std::uint32_t visit = 0;
   };
   struct Backup {
     int action = -1;
     double value = std::numeric_limits<double>::infinity();
     double lower = std::numeric_limits<double>::infinity();
+  };
+
+  template <class Stop>
+  std::optional<SolverStatus> TrialExactly(Stop& stop) {
+    ++trials_;
+    for (Belief b = model_.Restart();;) {
+      if (const auto why = stop(expansions_)) return why;
+      const Backup best = Update(b);
+      if (best.action < 0) return std::nullopt;
+      const Sampled next = SampleSuccessor(b, best.action);
+      if (next.belief == kGoalOrSolved) return std::nullopt;
+      b = model_.Enter(model_.Actions(b)[static_cast<std::size_t>(best.action)], next.outcome);
+    }
+  }
+
+  struct Sampled {
+    Belief belief = kGoalOrSolved;
+    std::uint32_t outcome = 0;  ///< of those that Actions lists
   };
 
   State& Node(Belief b) {
@@ -125,6 +178,7 @@ class RtdpBel {
     const Backup best = Evaluate(b);
     State& node = Node(b);
     node.value = best.value;  // line 7
+    node.updated = true;
     node.lower = std::max(node.lower, best.lower);
     return best;
   }
@@ -133,23 +187,25 @@ class RtdpBel {
   /// a), weight of the successor over weight of the belief; sampling outcomes is the same process. Only outcomes that
   /// are neither goals nor solved are drawn, except that trials in models with shares, whose policies may go round for
   /// ever, end at the goal as often as it is met.
-  Belief SampleSuccessor(Belief b, int action) {
+  Sampled SampleSuccessor(Belief b, int action) {
     double open = 0.0;
     const auto& chosen = model_.Actions(b)[static_cast<std::size_t>(action)];
     ForEachShareOf(model_, chosen,
                    [&](Belief next, double share) { open += Solved(next) ? 0.0 : share * model_.Weight(next); });
-    if (open == 0.0) return kGoalOrSolved;
+    if (open == 0.0) return {};
     if constexpr (HasShares<Model>) {
       double left = model_.Weight(b);
       ForEachShareOf(model_, chosen, [&](Belief next, double share) { left -= share * model_.Weight(next); });
-      if (random_.Uniform() * (open + std::max(0.0, left)) >= open) return kGoalOrSolved;
+      if (random_.Uniform() * (open + std::max(0.0, left)) >= open) return {};
     }
     double at = random_.Uniform() * open;
-    Belief sampled = kGoalOrSolved;
+    Sampled sampled;
+    std::uint32_t outcome = 0;
     ForEachShareOf(model_, chosen, [&](Belief next, double share) {
-      if (Solved(next) || (at < 0.0 && sampled != kGoalOrSolved)) return;
+      const std::uint32_t number = outcome++;
+      if (Solved(next) || (at < 0.0 && sampled.belief != kGoalOrSolved)) return;
       at -= share * model_.Weight(next);
-      sampled = next;
+      sampled = {next, number};
     });
     return sampled;
   }

@@ -154,8 +154,37 @@ void PomdpBeliefGraph::RepeatUntilChanged(std::uint32_t b, double to_goal, Actio
   for (std::size_t i = action.first; i < successors_.size(); ++i) successors_[i].share /= leaves;
 }
 
+std::uint32_t PomdpBeliefGraph::Restart() {
+  for (Node& node : beliefs_) node.first_action = kUnexpanded;
+  std::vector<SparseEntry> start = pomdp_.start;
+  DropGoals(start);
+  SetEntered(Start(), std::move(start));
+  return Start();
+}
+
+std::uint32_t PomdpBeliefGraph::Enter(const Action& action, std::uint32_t k) {
+  const Successor chosen = Successors(action)[k];
+  std::vector<SparseEntry> open;
+  BeliefUpdate update(pomdp_, &pulse_);
+  update(entered_, action.action, [&](std::uint32_t o, double, const std::vector<SparseEntry>& next) {
+    if (o == chosen.observation) open = next;
+  });
+  DropGoals(open);
+  SetEntered(chosen.belief, std::move(open));
+  return chosen.belief;
+}
+
+void PomdpBeliefGraph::SetEntered(std::uint32_t number, std::vector<SparseEntry> belief) {
+  beliefs_[entered_number_].first_action = kUnexpanded;
+  actions_.clear();
+  successors_.clear();
+  entered_ = std::move(belief);
+  entered_number_ = number;
+}
+
 void PomdpBeliefGraph::Expand(std::uint32_t b) {
-  const std::vector<SparseEntry> belief = beliefs_[b].states;  // Intern may move the beliefs
+  const std::vector<SparseEntry> belief = entered_.empty() ? beliefs_[b].states : entered_;  // Intern moves beliefs
+  const bool exact = levels_ == 0 || !entered_.empty();
   const auto first_action = static_cast<std::uint32_t>(actions_.size());
   BeliefUpdate update(pomdp_, &pulse_);
   for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
@@ -175,7 +204,7 @@ void PomdpBeliefGraph::Expand(std::uint32_t b) {
         if (absorbing_[s.index] != 0) to_goal += share * s.value;
       }
       const std::uint32_t successor = Intern(open);
-      changes = changes || successor != b || (levels_ == 0 && action.cost > 0.0 && !Unchanged(belief, Merged(open)));
+      changes = changes || successor != b || (exact && action.cost > 0.0 && !Unchanged(belief, Merged(open)));
       successors_.push_back({successor, o, share * left});
       ++action.count;
     });
@@ -186,7 +215,7 @@ void PomdpBeliefGraph::Expand(std::uint32_t b) {
     }
     if (!twin_.empty()) RepeatUntilChanged(b, to_goal, action);
     actions_.push_back(action);
-    bytes_ += sizeof(Action) + action.count * sizeof(Successor);
+    if (entered_.empty()) bytes_ += sizeof(Action) + action.count * sizeof(Successor);
   }
   beliefs_[b].first_action = first_action;
   beliefs_[b].action_count = static_cast<std::uint32_t>(actions_.size()) - first_action;

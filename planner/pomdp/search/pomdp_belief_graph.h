@@ -25,7 +25,8 @@ namespace feeler::planner {
 ///
 /// Beliefs are normalised, weights are 1. `levels` = 0: two beliefs are one if they agree up to rounding (1e-12), and
 /// what a search proves here holds for the POMDP. `levels` = D > 0: RTDP-Bel's discretisation, d(b)(s) = ceil(D b(s));
-/// the first belief met stands for all that share its d(b), and nothing is proven.
+/// the first belief met stands for all that share its d(b), until Restart() is called: from then on Actions are those
+/// of the belief entered last (SharesValues), and not kept. Nothing is proven.
 ///
 /// Without discount goals drop out of beliefs, which are then normalised over what is left: whatever is done, a goal
 /// costs nothing, so V*(b) = P(no goal yet) V*(b given that) whether a goal shows or not. Shares carry that
@@ -65,6 +66,11 @@ class PomdpBeliefGraph {
   double Weight(std::uint32_t /*b*/) const { return 1.0; }
   double Heuristic(std::uint32_t b) const { return beliefs_[b].heuristic; }
   bool expanded(std::uint32_t b) const { return beliefs_[b].first_action != kUnexpanded; }
+  /// Enters the initial belief itself. From here on no actions are kept. Returns its number, Start().
+  std::uint32_t Restart();
+  /// Enters the belief itself behind successor k of an action of the belief entered last. Returns its number.
+  std::uint32_t Enter(const Action& action, std::uint32_t k);
+  /// After Restart(): only of the belief entered last.
   std::span<const Action> Actions(std::uint32_t b) {
     if (!expanded(b)) Expand(b);
     return {actions_.data() + beliefs_[b].first_action, beliefs_[b].action_count};
@@ -117,6 +123,8 @@ class PomdpBeliefGraph {
   std::uint64_t HashOf(std::span<const SparseEntry> belief) const;
   bool Same(std::span<const SparseEntry> a, std::span<const SparseEntry> b) const;
   void Expand(std::uint32_t b);
+  /// Makes it the belief whose actions are known, to be worked out when they are asked for.
+  void SetEntered(std::uint32_t number, std::vector<SparseEntry> belief);
 
   const Pomdp& pomdp_;
   const StateBounds& bounds_;
@@ -131,6 +139,8 @@ class PomdpBeliefGraph {
   std::vector<Action> actions_;
   std::vector<Successor> successors_;
   std::unordered_multimap<std::uint64_t, std::uint32_t> index_;
+  std::vector<SparseEntry> entered_;  ///< empty before Restart()
+  std::uint32_t entered_number_ = 0;
   std::size_t bytes_ = 0;
 };
 

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <memory>
+#include <queue>
 
 #include "feeler/core/error.h"
 #include "feeler/planner/pomdp/model/observable_classes.h"
@@ -26,6 +26,10 @@ constexpr std::size_t kEvaluatedUnknowns = 400'000;
 /// Beliefs of a controller written out of a search, at most.
 constexpr std::size_t kControllerNodes = 5'000;
 constexpr std::size_t kExperienceBeliefs = 50'000;
+/// Without discount its controller goes on blindly at beliefs that are less probable than this.
+constexpr double kRare = 1e-3;
+/// Trials over beliefs themselves by which RTDP-Bel judges first whether its values still move.
+constexpr int kTrialWindow = 1000;
 /// What comes before the search may be late by so much (one that may not begin at all is of little use), and each of
 /// the two steps after it: writing the policy out, and evaluating it.
 constexpr double kGrace_s = 0.5;
@@ -59,6 +63,15 @@ class BlindIncumbent {
   const PomdpBeliefGraph& graph_;
   const StateBounds& bounds_;
   std::vector<double> values_;
+};
+
+/// A node of a controller whose action is not settled yet: the likeliest come first.
+struct ToFreeze {
+  double probability = 0.0;  ///< of one way that leads there
+  std::uint32_t number = 0;
+  bool operator<(const ToFreeze& other) const {
+    return probability != other.probability ? probability < other.probability : number > other.number;
+  }
 };
 
 class Attempt {
@@ -219,13 +232,15 @@ class Attempt {
     return Wall() > give_up_s || (Cancelled() && Wall() > cancelled_at_s_ + 2.0 * kGrace_s);
   }
 
-  /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where the policy goes
-  /// on blindly, as it does where it is cut short for being too large. Nothing where that would not reach a goal.
+  /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where it is not
+  /// known. There, where the policy comes with a probability below `rare`, and where it is cut short for being too
+  /// large, it does as at another belief of its kind or, where there is none, goes on blindly. Nothing where that would
+  /// not reach a goal.
   template <class ActionOf>
-  std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of) {
+  std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of, double rare = 0.0) {
     const double give_up_s = GiveUp();
     graph.SetStop([this, give_up_s] { return GivenUp(give_up_s); });
-    std::optional<PomdpController> controller = FreezeUntil(graph, action_of, give_up_s);
+    std::optional<PomdpController> controller = FreezeUntil(graph, action_of, rare, give_up_s);
     StopWithSearch(graph);
     return controller;
   }
@@ -236,26 +251,34 @@ class Attempt {
   }
 
   template <class ActionOf>
-  std::optional<PomdpController> FreezeUntil(PomdpBeliefGraph& graph, ActionOf action_of, double give_up_s) {
+  std::optional<PomdpController> FreezeUntil(PomdpBeliefGraph& graph, ActionOf action_of, double rare,
+                                             double give_up_s) {
     BlindIncumbent blind(graph, bounds_);
     PomdpController controller;
     std::map<std::uint32_t, std::uint32_t> number;
     std::vector<std::uint32_t> beliefs;
-    const auto of = [&](std::uint32_t b) {
+    std::priority_queue<ToFreeze> open;
+    const auto of = [&](std::uint32_t b, double probability) {
       const auto [found, added] = number.try_emplace(b, static_cast<std::uint32_t>(beliefs.size()));
-      if (added) beliefs.push_back(b);
+      if (added) {
+        open.push({probability, found->second});
+        beliefs.push_back(b);
+        controller.nodes.emplace_back();
+      }
       return found->second;
     };
-    of(graph.Start());
-    for (std::size_t i = 0; i < beliefs.size(); ++i) {
+    of(graph.Start(), 1.0);
+    while (!open.empty()) {
+      const auto [probability, i] = open.top();
+      open.pop();
       frozen_cut_ = beliefs.size() > kControllerNodes || GivenUp(give_up_s);
       int index = -1;
       try {
-        if (!frozen_cut_) index = action_of(beliefs[i]);
+        if (!frozen_cut_ && probability >= rare) index = action_of(beliefs[i]);
       } catch (const Interrupted&) {
         frozen_cut_ = true;
       }
-      PomdpController::Node node{0, {}, static_cast<std::uint32_t>(i)};
+      PomdpController::Node node{0, {}, i};
       if (index < 0) {
         if (!blind.Solved(beliefs[i])) return std::nullopt;
         node.action = static_cast<std::uint32_t>(blind.Action(beliefs[i]));
@@ -264,19 +287,19 @@ class Attempt {
         node.action = action.action;
         for (std::uint32_t k = 0; k < action.count; ++k) {
           const PomdpBeliefGraph::Successor next = graph.Successors(action)[k];
-          node.branches.push_back({next.observation, of(next.belief)});
+          node.branches.push_back({next.observation, of(next.belief, probability * next.share)});
         }
       }
-      controller.nodes.push_back(std::move(node));
+      controller.nodes[i] = std::move(node);
     }
     return controller;
   }
 
-  template <class Search, class SearchStop>
-  std::optional<SolverStatus> RunSearch(PomdpBeliefGraph& graph, Search& search, SearchStop stop) {
+  template <class Search>
+  std::optional<SolverStatus> RunSearch(PomdpBeliefGraph& graph, Search search) {
     StopWithSearch(graph);
     try {
-      return search.Run(graph.Start(), stop);
+      return search();
     } catch (const Interrupted&) {
       return Stop(0).value_or(SolverStatus::kTimeLimit);
     }
@@ -307,7 +330,7 @@ class Attempt {
       result_.value_upper =
           std::min(result_.value_upper, graph.to_goal() - graph.start_share() * search.Lower(graph.Start()));
     };
-    const auto why = RunSearch(graph, search, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+    const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       account(expansions);
       if (pomdp_.discount == 1.0 && search.trials() >= next_offer_) {
         next_offer_ = 2 * search.trials();
@@ -317,7 +340,8 @@ class Attempt {
       if (result_.value_upper - result_.value_lower <= options_.precision) return SolverStatus::kConverged;
       if (OutOfMemory(graph.bytes() + search.bytes() + incumbent.bytes())) return SolverStatus::kMemoryLimit;
       return Stop(expansions);
-    });
+    };
+    const auto why = RunSearch(graph, [&] { return search.Run(graph.Start(), stop); });
     account(search.expansions());
     result_.beliefs = graph.size();
     result_.status = why.value_or(SolverStatus::kConverged);
@@ -362,31 +386,76 @@ class Attempt {
   template <class Initial>
   void RunRtdp(PomdpBeliefGraph& graph, Initial initial) {
     RtdpBel search(graph, initial, options_.seed);
-    const auto why = RunSearch(graph, search, [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+    const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       result_.trials = search.trials();
       result_.expansions = expansions;
       Row(false);
       if (OutOfMemory(graph.bytes() + search.bytes())) return SolverStatus::kMemoryLimit;
       return Stop(expansions);
-    });
+    };
+    std::optional<SolverStatus> why;
+    // Without discount evidence that discretised beliefs do not show would leave them without a way to a goal.
+    const bool labelled = options_.levels == 0 || pomdp_.discount < 1.0;
+    const bool exactly = options_.levels > 0 && (options_.exact_trials || !labelled);
+    if (labelled) {
+      why = RunLabelled(graph, search, exactly, stop);
+      // The discretised model proves nothing: what its policy is worth is found by evaluating it on the POMDP itself.
+      OfferAlso(Freeze(graph, [&](std::uint32_t b) {
+        if (search.Solved(b)) return search.Action(b);
+        return Least(graph, b, [&](std::uint32_t next) { return search.Value(next); });
+      }));
+    }
+    if (exactly && !why) {
+      why = RunSearch(graph, [&] { return search.RunExactly(options_.precision, kTrialWindow, stop); });
+      if (pomdp_.discount == 1.0) OfferAlso(FreezeExact(graph, search, kRare));
+      if (pomdp_.discount < 1.0 || !Stop(0)) OfferAlso(FreezeExact(graph, search, 0.0));
+    }
     result_.status = why.value_or(SolverStatus::kConverged);
     result_.trials = search.trials();
     result_.expansions = search.expansions();
     result_.beliefs = graph.size();
-    // The discretised model proves nothing: what its policy is worth is found by evaluating it on the POMDP itself.
-    const auto greedy = [&](std::uint32_t b) {
-      if (search.Solved(b)) return search.Action(b);
-      return Least(graph, b, [&](std::uint32_t next) { return search.Value(next); });
-    };
-    const std::optional<PomdpController> controller = Freeze(graph, greedy);
-    if (controller) Offer(*controller);
-    if (!result_.controller) result_.controller = controller;
-    if (options_.simulate > 0) {
-      BeliefAgent agent(pomdp_,
-                        [&](std::span<const SparseEntry> belief) { return LookAhead(graph, search, initial, belief); });
+    if (options_.simulate > 0 && result_.controller) {
+      ControllerAgent agent(*result_.controller);
       result_.simulated = SimulatePomdp(
           pomdp_, agent, {.episodes = options_.simulate, .seed = options_.seed, .cancellation = options_.cancellation});
     }
+  }
+
+  /// Nothing where it converged, or where trials over the beliefs themselves are to follow and a third of the limits is
+  /// used up: what is discretised too coarsely never converges.
+  template <class Search, class SearchStop>
+  std::optional<SolverStatus> RunLabelled(PomdpBeliefGraph& graph, Search& search, bool more_follows, SearchStop stop) {
+    if (!more_follows) return RunSearch(graph, [&] { return search.Run(graph.Start(), stop); });
+    const double until_s = Wall() + (options_.time_limit_s - Wall()) / 3.0;
+    bool cut = false;
+    const auto some = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
+      if (const auto why = stop(expansions)) return why;
+      cut = expansions >= options_.expansion_limit / 3 || Wall() >= until_s;
+      return cut ? std::optional(SolverStatus::kTimeLimit) : std::nullopt;
+    };
+    const auto why = RunSearch(graph, [&] { return search.Run(graph.Start(), some); });
+    return cut ? std::nullopt : why;
+  }
+
+  void OfferAlso(const std::optional<PomdpController>& controller) {
+    if (controller) Offer(*controller);
+    if (!result_.controller) result_.controller = controller;
+  }
+
+  /// Greedy for the table of a search over discretised beliefs, from the beliefs themselves; blind where the search has
+  /// not been, and where it comes with a probability below `rare`: what it knows there may go round for ever.
+  template <class Search>
+  std::optional<PomdpController> FreezeExact(const PomdpBeliefGraph& table, Search& search, double rare) {
+    PomdpBeliefGraph exact(pomdp_, bounds_, 0);
+    const auto greedy = [&](std::uint32_t b) {
+      const std::uint32_t known = table.Find(exact.Belief(b));
+      if (known == PomdpBeliefGraph::kNone || !search.Updated(known)) return -1;
+      return Least(exact, b, [&](std::uint32_t next) {
+        const std::uint32_t behind = table.Find(exact.Belief(next));
+        return behind == PomdpBeliefGraph::kNone ? options_.epsilon * exact.Heuristic(next) : search.Value(behind);
+      });
+    };
+    return Freeze(exact, greedy, rare);
   }
 
   /// The action of least cost; negative in a dead end.
@@ -400,33 +469,6 @@ class Attempt {
       graph.ForEachShare(action, [&](std::uint32_t next, double share) { cost += share * value(next); });
       if (cost < least) least = cost, best = index;
       ++index;
-    }
-    return best;
-  }
-
-  /// RTDP-Bel's policy: greedy for the table, from the belief itself rather than from what stands for it.
-  template <class Search, class Initial>
-  std::uint32_t LookAhead(PomdpBeliefGraph& graph, Search& search, Initial& /*initial*/,
-                          std::span<const SparseEntry> belief) {
-    std::uint32_t best = 0;
-    double least = kUnbounded;
-    Pulse pulse([this] { return Cancelled(); });
-    BeliefUpdate update(pomdp_, &pulse);
-    for (std::uint32_t a = 0; a < pomdp_.action_count(); ++a) {
-      double cost = graph.CostOf(belief, a);
-      update(belief, a, [&](std::uint32_t, double probability, const std::vector<SparseEntry>& next) {
-        const double share = probability * pomdp_.discount;
-        if (graph.IsGoal(next)) {
-          cost += share * graph.to_goal();
-          return;
-        }
-        std::vector<SparseEntry> open = next;
-        const double left = graph.DropGoals(open);
-        const std::uint32_t known = graph.Find(open);
-        cost += share * left *
-                (known == PomdpBeliefGraph::kNone ? options_.epsilon * graph.HeuristicOf(open) : search.Value(known));
-      });
-      if (cost < least) least = cost, best = a;
     }
     return best;
   }

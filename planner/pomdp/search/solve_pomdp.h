@@ -47,12 +47,15 @@ struct PomdpSolverOptions {
   double precision = 1e-3;
   /// Levels of RTDP-Bel's discretisation d(b)(s) = ceil(D b(s)), of it and E-RTDP-Bel alone; >= 0, 0: none.
   int levels = 15;
+  /// With levels above 0: goes on with trials over the beliefs themselves where the labelled search over discretised
+  /// ones has ended (RtdpBel::RunExactly), until the value of the initial belief moves by no more than `precision`.
+  bool exact_trials = true;
   double epsilon = 1.0;  ///< inflation of their heuristic, in costs to the goal; >= 1
   double time_limit_s = std::numeric_limits<double>::infinity();
   std::int64_t expansion_limit = std::numeric_limits<std::int64_t>::max();
   std::size_t memory_limit_bytes = std::size_t{1} << 32;
   std::uint64_t seed = 1;
-  /// Episodes of RTDP-Bel's and E-RTDP-Bel's greedy policy to simulate after the search; 0: none.
+  /// Episodes of the controller of RTDP-Bel or E-RTDP-Bel to simulate after the search; 0: none.
   int simulate = 0;
   const PomdpController* experience = nullptr;  ///< of E-RTDP-Bel: a policy of a similar problem; may be null
   const CancellationToken* cancellation = nullptr;
