@@ -176,12 +176,14 @@ class Derivation {
     const double c = result_.cell_m;
     const auto up = [&](double value) { return c * std::ceil(value / c - 1e-9); };
     const double top = std::max(target_.max().z(), 0.0);
-    const double room = std::max(3 * c, kTransferRoom_m);
+    // Transfers keep clear of targets up to half a cell beyond the hypotheses, and the lattice may lie half a cell
+    // lower.
+    const double room = std::max(3 * c, c + kTransferRoom_m);
     const double start = up(top + 0.5 * Range(2) + room);
     Add("feeler_start_offset", false, Plain(Eigen::Vector3d(0, 0, start)),
         fmt::format("top of the target {} mm over the mouth, half the range of heights {} mm, {}", Plain(1000 * top),
                     Plain(500 * Range(2)),
-                    room > 3 * c ? Plain(1000 * room) + " mm for the transfer, which keeps 4 mm clear" : "3 cells"));
+                    room > 3 * c ? "a cell and 4.5 mm for the transfer, which keeps 4 mm clear" : "3 cells"));
     Eigen::Vector3d low;
     Eigen::Vector3d high;
     for (int k = 0; k < 2; ++k) {

@@ -3,6 +3,7 @@
 // mended is stated; the force budget is a number of the task, with its reason, and less for a tip that bears less.
 #include "feeler/evaluation/cad_import/import_task.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,11 +56,15 @@ TEST_F(ImportTaskTest, LoadsWithTheClearanceThatWasDrawn) {
 
 TEST_F(ImportTaskTest, TheStartIsAsFarAsATransferKeepsClear) {
   ImportOptions options = OptionsFor("keyed", "step");
-  options.overrides["feeler_resolution"] = "0.0008 0.0008 0.0008";
-  const ImportedTask task = ImportTask(options);
-  const env::TaskModel model = env::LoadTask(task.task_file.string());
-  const double highest_m = 0.5 * 0.0008 * (task.content.numbers.cells.back() - 1);
-  EXPECT_GE(model.task.start_offset_m.z() - highest_m, 0.004);
+  for (const double cell_m : {0.0008, 0.0015, 0.0018, 0.0023}) {
+    options.overrides["feeler_resolution"] = fmt::format("{0} {0} {0}", cell_m);
+    const ImportedTask task = ImportTask(options);
+    const env::TaskModel model = env::LoadTask(task.task_file.string());
+    // Transfers keep clear of targets half a cell beyond the hypotheses; the lattice may lie half a cell lower.
+    const double highest_m = 0.5 * cell_m * (task.content.numbers.cells.back() - 1);
+    EXPECT_GE(model.task.start_offset_m.z() - highest_m - cell_m, 0.004) << cell_m;
+    fs::remove_all(options.out);
+  }
 }
 
 TEST_F(ImportTaskTest, AUnitIsGivenToFilesThatDoNotSay) {
