@@ -122,7 +122,7 @@ TEST_F(ImportTaskTest, SidesThatSlantAreNoFlushPart) {
   EXPECT_THAT(task.notes, testing::Not(speaks_of_flush));
   options = OptionsFor("rectangle", "step");
   options.uncertainty_m = {0.001, 0.001, 0.001};
-  options.overrides["feeler_workspace"] = "0.003 0.003 0.01";  // no side is within reach
+  options.overrides["feeler_workspace"] = "0.003 0.003 0.015";  // no side is within reach
   const ImportedTask inner = ImportTask(options);
   EXPECT_TRUE(inner.flush_x && inner.flush_y);
   EXPECT_THAT(inner.notes, speaks_of_flush);
