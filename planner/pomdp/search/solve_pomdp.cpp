@@ -421,16 +421,16 @@ class Attempt {
     }
   }
 
-  /// Nothing where it converged, or where trials over the beliefs themselves are to follow and a third of the limits is
-  /// used up: what is discretised too coarsely never converges.
+  /// Nothing where it converged, or where trials over the beliefs themselves are to follow and two thirds of the limits
+  /// are used up: what is discretised too coarsely never converges.
   template <class Search, class SearchStop>
   std::optional<SolverStatus> RunLabelled(PomdpBeliefGraph& graph, Search& search, bool more_follows, SearchStop stop) {
     if (!more_follows) return RunSearch(graph, [&] { return search.Run(graph.Start(), stop); });
-    const double until_s = Wall() + (options_.time_limit_s - Wall()) / 3.0;
+    const double until_s = Wall() + (options_.time_limit_s - Wall()) * 2.0 / 3.0;
     bool cut = false;
     const auto some = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
       if (const auto why = stop(expansions)) return why;
-      cut = expansions >= options_.expansion_limit / 3 || Wall() >= until_s;
+      cut = expansions >= options_.expansion_limit / 3 * 2 || Wall() >= until_s;
       return cut ? std::optional(SolverStatus::kTimeLimit) : std::nullopt;
     };
     const auto why = RunSearch(graph, [&] { return search.Run(graph.Start(), some); });
