@@ -217,7 +217,7 @@ ExperimentResult RunPomdpBenchmarksOn(const std::vector<planner::Pomdp>& models,
   result.figures.push_back({"Width of the proven interval", "wall seconds", "upper - lower", true, true, {}});
   result.text = fmt::format(
       "General POMDPs: proven interval after {:g} s, SARSOP's after 60 s, and RTDP-Bel ({} levels, {:g} s): the exact "
-      "value of its controller, and the mean of {} episodes of its greedy policy\n\n"
+      "value of its controller, and the mean of {} episodes of it\n\n"
       "{:<16} {:>7} {:>10} {:>10} {:>8} {:>8} | {:>19} {:>7} | {:>9} {:>9} {:>7} {:>8}\n",
       protocol.time_limit_s, protocol.levels, protocol.bel_time_limit_s, protocol.episodes, "model", "states", "lower",
       "upper", "width", "CPU s", "SARSOP", "ratio", "RTDP-Bel", "episodes", "+-", "CPU s");

@@ -15,11 +15,11 @@ struct PomdpBenchmarksProtocol {
   double time_limit_s = 60.0;      ///< of the search between bounds, a model
   double bel_time_limit_s = 20.0;  ///< of RTDP-Bel, a model
   int levels = 15;                 ///< of its discretisation
-  int episodes = 10000;            ///< of its greedy policy
+  int episodes = 10000;            ///< of its controller
 };
 
 /// Each model by the search between bounds (its interval, beside SARSOP's where that is printed) and by RTDP-Bel (the
-/// exact value of its controller, and its greedy policy in episodes). Finished models are kept in the folder.
+/// exact value of its controller, and that in episodes). Finished models are kept in the folder.
 ExperimentResult RunPomdpBenchmarksOn(const std::vector<planner::Pomdp>& models,
                                       const PomdpBenchmarksProtocol& protocol, const ExperimentRequest& request);
 
