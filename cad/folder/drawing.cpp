@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "feeler/cad/section/section.h"
@@ -81,6 +82,21 @@ class Sheet {
   std::string body_;
 };
 
+/// Where the part is cut open: in the middle, or through the opening that is nearest to it.
+double PlaneThroughOpening(const Mating& mating, int axis) {
+  double plane = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const SlabLoop& loop : mating.openings) {
+    const Eigen::AlignedBox2d bounds = BoundsOf(loop);
+    if (bounds.min()[axis] < 0 && bounds.max()[axis] > 0) return 0;
+    const double middle = bounds.center()[axis];
+    if (std::abs(middle) >= nearest) continue;
+    nearest = std::abs(middle);
+    plane = middle;
+  }
+  return plane;
+}
+
 Eigen::AlignedBox2d OpeningIn(const Mating& mating, int across) {
   Eigen::AlignedBox2d box;
   for (const SlabLoop& loop : mating.openings) {
@@ -91,16 +107,20 @@ Eigen::AlignedBox2d OpeningIn(const Mating& mating, int across) {
   return box;
 }
 
-/// The gap between tool and target on a level line: the first change between material of one and of the other, from the
-/// middle to the right.
+/// A gap between tool and target on a level line; `to` lies farther from the middle of the opening.
 struct Gap {
   bool found = false;
   double from = 0;
   double to = 0;
+
+  /// By how much it is not as wide as the clearance.
+  double Off(double clearance) const { return std::abs(std::abs(to - from) - clearance); }
 };
+/// Of the changes between material of one and of the other the one that is as wide as the clearance, as nearly as any:
+/// a hollow plug has another within.
 Gap GapOnLine(const std::vector<SlabLoop>& tool, const std::vector<SlabLoop>& target, double level, double from,
-              double to) {
-  Gap gap;
+              double to, double clearance) {
+  Gap best;
   constexpr int kSteps = 20000;
   bool last_tool = false;
   bool last_target = false;
@@ -110,8 +130,8 @@ Gap GapOnLine(const std::vector<SlabLoop>& tool, const std::vector<SlabLoop>& ta
     const bool in_tool = IsMaterial(tool, p);
     const bool in_target = !in_tool && IsMaterial(target, p);
     if ((in_tool && last_target) || (in_target && last_tool)) {
-      gap = {true, end, p.x()};
-      if (gap.to - gap.from < 0.3 * (to - from)) return gap;
+      const Gap gap{true, end, p.x()};
+      if (!best.found || gap.Off(clearance) < best.Off(clearance)) best = gap;
     }
     if (in_tool || in_target) {
       end = p.x();
@@ -119,7 +139,7 @@ Gap GapOnLine(const std::vector<SlabLoop>& tool, const std::vector<SlabLoop>& ta
       last_target = in_target;
     }
   }
-  return gap;
+  return best;
 }
 
 }  // namespace
@@ -127,7 +147,7 @@ Gap GapOnLine(const std::vector<SlabLoop>& tool, const std::vector<SlabLoop>& ta
 std::string SectionSvg(const Mating& mating, const TriangleMesh& tool, const TriangleMesh& target,
                        const DrawingOptions& options) {
   const Eigen::Vector3d offset(0, 0, -options.tool_depth_m);
-  const double height = options.axis == 2 ? -0.5 * mating.depth_m : 0.0;
+  const double height = options.axis == 2 ? -0.5 * mating.depth_m : PlaneThroughOpening(mating, options.axis);
   const std::vector<SlabLoop> tool_cut = Cut(tool, offset, options.axis, height);
   const std::vector<SlabLoop> target_cut = Cut(target, Eigen::Vector3d::Zero(), options.axis, height);
   const int across = options.axis == 0 ? 1 : 0;
@@ -142,13 +162,22 @@ std::string SectionSvg(const Mating& mating, const TriangleMesh& tool, const Tri
     opening.extend(Eigen::Vector2d(mating.mating_box.max()[across], 0));
   }
   const double level = options.axis == 2 ? opening.center().y() : -0.5 * mating.depth_m;
-  const Gap gap =
-      GapOnLine(tool_cut, target_cut, level, opening.center().x(), opening.max().x() + 0.5 * opening.sizes().x());
+  // To the right, unless only the left has the clearance.
+  const auto gap_at = [&](double y) {
+    const double middle = opening.center().x();
+    const Gap right = GapOnLine(tool_cut, target_cut, y, middle, middle + opening.sizes().x(), clearance);
+    const Gap left = GapOnLine(tool_cut, target_cut, y, middle, middle - opening.sizes().x(), clearance);
+    const bool take_left = left.found && (!right.found || left.Off(clearance) + 0.1 * clearance < right.Off(clearance));
+    return take_left ? left : right;
+  };
+  const Gap gap = gap_at(level);
   Eigen::Vector2d center = opening.center();
   double span = 1.8 * std::max(opening.sizes().x(), 0.8 * opening.sizes().y());
   if (options.zoom) {
-    center = {gap.found ? 0.5 * (gap.from + gap.to) : opening.max().x(), options.axis == 2 ? level : 0.0};
     span = std::max(12 * clearance, 5 * mating.lead_in_m[across]);
+    // Where the one ends below the rim of the other, in the middle of the depth.
+    const bool at_rim = options.axis != 2 && gap_at(-0.25 * span).found;
+    center = {gap.found ? 0.5 * (gap.from + gap.to) : opening.max().x(), at_rim ? 0.0 : level};
   }
   const Eigen::Vector2d half(0.5 * span, 0.42 * span);
   Sheet sheet({center - half, center + half});
@@ -163,7 +192,7 @@ std::string SectionSvg(const Mating& mating, const TriangleMesh& tool, const Tri
   if (gap.found) {
     const double y = options.zoom && options.axis != 2 ? center.y() - 0.25 * span : level;
     sheet.Line({gap.from, y}, {gap.to, y}, "stroke=\"#c00\" stroke-width=\"2.5\"");
-    sheet.Label({gap.from, y}, fmt::format("clearance {:.3f} mm a side", 1000 * clearance), "end");
+    sheet.Label({std::min(gap.from, gap.to), y}, fmt::format("clearance {:.3f} mm a side", 1000 * clearance), "end");
   }
   if (options.axis != 2) sheet.Label({center.x() - half.x(), 0}, "rim", "start");
   return sheet.Finish();

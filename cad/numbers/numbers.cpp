@@ -17,7 +17,7 @@ constexpr double kFingers_m = 0.016;        // how far they reach down over the 
 constexpr double kFingerRoom_m = 0.003;     // that stays between them and the target
 constexpr double kFarthestSide_m = 0.08;    // farther sides are not worth the size of the contact map
 constexpr double kLowestTarget_m = 0.2;     // of the mouth over the table: what the arm reaches well
-constexpr double kTransferRoom_m = 0.0045;  // over what a transfer keeps clear (env/robot/transfer_checker.h)
+constexpr double kTransferRoom_m = 0.0041;  // over what a transfer keeps clear (env/robot/transfer_checker.h)
 constexpr int kMostCells = 64;
 
 std::string Plain(double value) {
@@ -172,18 +172,28 @@ class Derivation {
     return 0;
   }
 
+  /// How much lower than its offset says the start may be: the lattice is laid between the walls that are met.
+  double LatticeLower() const {
+    const auto z = std::ranges::find(uncertain_, 2);
+    if (z == uncertain_.end()) return 0;
+    const bool even = result_.cells[static_cast<std::size_t>(z - uncertain_.begin())] % 2 == 0;
+    if (even || walls_[2].empty()) return 0.5 * result_.cell_m;
+    std::vector<double> cells;
+    for (const double wall : walls_[2]) cells.push_back(wall / result_.cell_m);
+    return std::max(0.0, -env::ChoosePhase(cells).phase) * result_.cell_m;
+  }
+
   void Motion() {
     const double c = result_.cell_m;
     const auto up = [&](double value) { return c * std::ceil(value / c - 1e-9); };
     const double top = std::max(target_.max().z(), 0.0);
-    // Transfers keep clear of targets up to half a cell beyond the hypotheses, and the lattice may lie half a cell
-    // lower.
-    const double room = std::max(3 * c, c + kTransferRoom_m);
+    // Transfers keep clear of targets up to half a cell beyond the hypotheses.
+    const double room = std::max(3 * c, LatticeLower() + 0.5 * c + kTransferRoom_m);
     const double start = up(top + 0.5 * Range(2) + room);
     Add("feeler_start_offset", false, Plain(Eigen::Vector3d(0, 0, start)),
         fmt::format("top of the target {} mm over the mouth, half the range of heights {} mm, {}", Plain(1000 * top),
                     Plain(500 * Range(2)),
-                    room > 3 * c ? "a cell and 4.5 mm for the transfer, which keeps 4 mm clear" : "3 cells"));
+                    room > 3 * c ? Plain(1000 * room) + " mm for the transfer, which keeps 4 mm clear" : "3 cells"));
     Eigen::Vector3d low;
     Eigen::Vector3d high;
     for (int k = 0; k < 2; ++k) {

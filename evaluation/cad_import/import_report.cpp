@@ -63,9 +63,9 @@ std::string Drawings(const ImportedTask& task) {
   };
   const double in = task.mating.depth_m;
   add(1, false, in, "Section across y, the tool in. Orange dashes: what the lid closes while the target is localized.");
-  add(1, true, in, "The gap in x at the rim, enlarged.");
+  add(1, true, in, "The gap in x, enlarged.");
   add(0, false, in, "Section across x, the tool in.");
-  add(0, true, in, "The gap in y at the rim, enlarged.");
+  add(0, true, in, "The gap in y, enlarged.");
   add(2, false, in, "Section across the way in, in the middle of the depth.");
   add(1, false, -0.2 * in, "About to enter.");
   return html + "</div>\n";

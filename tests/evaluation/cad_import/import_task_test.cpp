@@ -13,6 +13,7 @@
 #include <fstream>
 
 #include "feeler/core/error.h"
+#include "feeler/env/contact/contact_map_builder.h"
 #include "feeler/env/model/task_file.h"
 #include "feeler/env/model/task_xml.h"
 #include "feeler/evaluation/cad_import/trial.h"
@@ -56,13 +57,15 @@ TEST_F(ImportTaskTest, LoadsWithTheClearanceThatWasDrawn) {
 
 TEST_F(ImportTaskTest, TheStartIsAsFarAsATransferKeepsClear) {
   ImportOptions options = OptionsFor("keyed", "step");
-  for (const double cell_m : {0.0008, 0.0015, 0.0018, 0.0023}) {
+  for (const double cell_m : {0.0008, 0.0015, 0.0016, 0.0018, 0.0019}) {
     options.overrides["feeler_resolution"] = fmt::format("{0} {0} {0}", cell_m);
     const ImportedTask task = ImportTask(options);
     const env::TaskModel model = env::LoadTask(task.task_file.string());
-    // Transfers keep clear of targets half a cell beyond the hypotheses; the lattice may lie half a cell lower.
-    const double highest_m = 0.5 * cell_m * (task.content.numbers.cells.back() - 1);
-    EXPECT_GE(model.task.start_offset_m.z() - highest_m - cell_m, 0.004) << cell_m;
+    // Transfers keep clear of targets half a cell beyond the hypotheses, and the lattice lies where the map lays it.
+    const planner::ContactMap map = env::BuildContactMap(model, env::Opening::kClosed);
+    const double start_m = model.task.start_offset_m.z() + cell_m * map.phase().z();
+    const double highest_m = 0.5 * cell_m * task.content.numbers.cells.back();
+    EXPECT_GE(start_m - highest_m, 0.004) << cell_m;
     fs::remove_all(options.out);
   }
 }
