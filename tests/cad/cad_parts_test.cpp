@@ -13,9 +13,11 @@
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <regex>
 #include <utility>
 
 #include "feeler/cad/align/alignment.h"
+#include "feeler/cad/folder/drawing.h"
 #include "feeler/cad/folder/task_folder.h"
 #include "feeler/cad/measure/deviation.h"
 #include "feeler/cad/measure/mating.h"
@@ -318,6 +320,32 @@ TEST_F(CadParts, AKeyIsFoundHoweverItIsTurnedAndHoweverLargeItIs) {
         EXPECT_NEAR(1000 * mating.clearance_m.y(), drawn_mm, 0.002) << kind << ' ' << drawn.roll_deg;
       }) << kind
          << ' ' << drawn.roll_deg;
+    }
+  }
+}
+
+TEST_F(CadParts, TheGapThatIsDrawnIsAsWideAsTheClearance) {
+  const std::regex gap("<line x1=\"([0-9.]+)\" y1=\"[0-9.]+\" x2=\"([0-9.]+)\" y2=\"[0-9.]+\" stroke=\"#c00\"");
+  const std::regex width("viewBox=\"0 0 ([0-9]+)");
+  // A tongue within a shell, a latch beside the plug, pins beside the middle.
+  for (const std::string kind : {"usb-a", "rj45", "three-pin", "shell", "keyed"}) {
+    const PartFiles files = WriteParts(kind, folder_, "step");
+    const TriangleMesh tool = Read(files.tool).mesh;
+    const TriangleMesh target = Read(files.target).mesh;
+    const Alignment alignment = FindAlignment(tool, target);
+    const Mating mating =
+        MeasureMating(tool, target, alignment.frame_T_tool, alignment.frame_T_target, alignment.tool_has_opening);
+    for (const int axis : {0, 1}) {
+      const std::string svg = SectionSvg(mating, Transformed(tool, mating.frame_T_tool),
+                                         Transformed(target, mating.frame_T_target), {axis, true, mating.depth_m});
+      std::smatch line;
+      std::smatch box;
+      ASSERT_TRUE(std::regex_search(svg, line, gap)) << kind << ' ' << axis;
+      ASSERT_TRUE(std::regex_search(svg, box, width));
+      const double clearance_m = mating.clearance_m[1 - axis];
+      const double span_m = std::max(12 * clearance_m, 5 * mating.lead_in_m[1 - axis]);
+      const double drawn_m = std::abs(std::stod(line[2]) - std::stod(line[1])) / std::stod(box[1]) * span_m;
+      EXPECT_NEAR(drawn_m, clearance_m, 0.02 * clearance_m + 2e-6) << kind << ' ' << axis;
     }
   }
 }
