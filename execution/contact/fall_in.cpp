@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "feeler/execution/contact/continuous_travel.h"
@@ -18,10 +19,13 @@ constexpr double kAbove = 2.0;
 /// Of a motion that is to meet a wall of the opening, shortfalls behind where that may stand.
 constexpr double kBehindWall = 4.0;
 
+/// As deep as a tool stands in an opening that it cannot go through, cells.
+double DeepestOf(const Task& task) { return task.insertion_depth_m / task.cell_m + 1.0; }
+
+/// Those that the tool stands less than `deepest` below, cells.
 std::vector<Eigen::Vector3d> MouthsOverTool(const Task& task, const planner::Problem& problem,
-                                            const Eigen::Vector3d& tool) {
+                                            const Eigen::Vector3d& tool, double deepest) {
   const Eigen::Vector3d inward = UnitVector(task.insertion);
-  const double deepest = task.insertion_depth_m / task.cell_m + 1.0;
   std::vector<Eigen::Vector3d> mouths;
   for (const planner::Hypothesis& h : problem.hypotheses) {
     const Eigen::Vector3d displacement = tool - h.offset.cast<double>();
@@ -83,7 +87,7 @@ double FarthestWallInside(const Task& task, const Mover& mover) {
 std::optional<double> DeepestInside(const Task& task, const planner::Problem& problem, const Eigen::Vector3d& tool) {
   const Eigen::Vector3d inward = UnitVector(task.insertion);
   std::optional<double> deepest;
-  for (const Eigen::Vector3d& mouth : MouthsOverTool(task, problem, tool)) {
+  for (const Eigen::Vector3d& mouth : MouthsOverTool(task, problem, tool, DeepestOf(task))) {
     deepest = std::max(deepest.value_or(kAtMouth), (tool - mouth).dot(inward));
   }
   return deepest;
@@ -98,8 +102,10 @@ std::optional<Eigen::Vector3d> LocateFromInside(const Task& task, const planner:
   const planner::ContactMap& map = *problem.map;
   const int axis = AxisOf(task.insertion);
   const Eigen::Vector3d inward = UnitVector(task.insertion);
-  const std::vector<Eigen::Vector3d> mouths = MouthsOverTool(task, problem, mover.position());
-  if (mouths.empty()) return std::nullopt;
+  if (!MayHaveFallenIn(task, problem, mover.position())) return std::nullopt;
+  // An opening may go through, and hold the tool deeper than it is inserted.
+  const std::vector<Eigen::Vector3d> mouths =
+      MouthsOverTool(task, problem, mover.position(), std::numeric_limits<double>::infinity());
   Eigen::Vector3d target = mouths.front();
   for (int across = 0; across < 3; ++across) {
     if (across == axis) continue;

@@ -236,7 +236,12 @@ Touch Localizer::ProbeAlong(const GuardedMove& move, const Prediction& predictio
   const Eigen::Vector3d station = Station();
   const double from = mover_.position()[axis];
   const double overtravel = prediction.sure_contact ? options.sure_overtravel_cells : options.overtravel_cells;
-  const double end = station[axis] + sign * (move.cells + overtravel);
+  double reach = move.cells + overtravel;
+  if (prediction.sure_contact && move.direction == task_.insertion) {
+    // Where an opening goes through, nothing else would stop a tool that fell in from going deeper than it is found at.
+    reach = std::min(reach, prediction.farthest + task_.insertion_depth_m / task_.cell_m);
+  }
+  const double end = station[axis] + sign * reach;
   const double behind = sign * (station[axis] - from);  // positive: a pending motion lies before the move
   const PredictedCells predicted = std::array<double, 2>{prediction.nearest + behind, prediction.farthest + behind};
 
