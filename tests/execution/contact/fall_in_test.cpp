@@ -1,5 +1,7 @@
 // Laws of a tool that may have fallen into the opening, or passed an edge that it was to meet:
 // - in the opening it goes aside no faster than the budget allows for walls that hold it along its length;
+// - a long probe that falls into an opening deeper than the insertion stops where the fall can be told, at every
+// height;
 // - a motion that is not watched comes off a contact, or goes back where the tool came from, or straight out.
 #include "feeler/execution/contact/fall_in.h"
 
@@ -173,6 +175,26 @@ TEST(FallIn, AToolInTheOpeningGoesAsideAsSlowlyAsWallsThatHoldItAsk) {
     }
   }
   EXPECT_GE(inside, 12) << "the tool was not in the opening";
+}
+
+TEST(FallIn, AnOpeningThatGoesThroughIsNoTrap) {
+  Task task = HousingTask();
+  task.insertion_depth_m = 0.010;
+  Task through = task;
+  through.insertion_depth_m = 0.028;
+  const planner::Extents extents = {3, 3, 5};
+  const planner::Problem problem = planner::MakeCuboidProblem(task, HousingMap(), extents);
+  const Pose start = LatticeStartPose(task, problem, Pose::Identity());
+  constexpr int kLong = 32;
+  for (int height = -2; height <= 2; ++height) {
+    const Pose truth = MakePose({start.translation().x() + 2e-4, start.translation().y() - 1e-4, height * task.cell_m});
+    WitnessRobot robot(through, truth, start, RandomStream(8, 1, "robot"));
+    ScriptedPolicy policy({{Direction::kMinusZ, kLong}});
+    const ExecutionRecord record = Execute(task, problem, Pose::Identity(), policy, robot, ExecutorOptions());
+    EXPECT_TRUE(record.fell_in) << height;
+    EXPECT_TRUE(record.believed_inserted) << height << ": " << record.reason;
+    EXPECT_LT((record.world_T_estimate->translation() - truth.translation()).norm(), 5e-4) << height;
+  }
 }
 
 TEST(FallIn, AMotionThatIsNotWatchedGoesWhereTheToolCameFrom) {
