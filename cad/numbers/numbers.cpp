@@ -41,13 +41,16 @@ std::string Repeated(const std::string& value, std::size_t count) {
   return text;
 }
 
+/// How a lattice of such cells is laid between the walls across an axis.
+env::LatticePhase PhaseAt(const std::vector<double>& walls_m, double cell_m) {
+  std::vector<double> cells;
+  for (const double wall : walls_m) cells.push_back(wall / cell_m);
+  return env::ChoosePhase(cells);
+}
+
 double MarginAt(const Walls& walls, double cell_m) {
   double margin = 0.5;
-  for (const std::vector<double>& along : walls) {
-    std::vector<double> cells;
-    for (const double wall : along) cells.push_back(wall / cell_m);
-    margin = std::min(margin, env::ChoosePhase(cells).margin);
-  }
+  for (const std::vector<double>& along : walls) margin = std::min(margin, PhaseAt(along, cell_m).margin);
   return margin;
 }
 
@@ -178,9 +181,7 @@ class Derivation {
     if (z == uncertain_.end()) return 0;
     const bool even = result_.cells[static_cast<std::size_t>(z - uncertain_.begin())] % 2 == 0;
     if (even || walls_[2].empty()) return 0.5 * result_.cell_m;
-    std::vector<double> cells;
-    for (const double wall : walls_[2]) cells.push_back(wall / result_.cell_m);
-    return std::max(0.0, -env::ChoosePhase(cells).phase) * result_.cell_m;
+    return std::max(0.0, -PhaseAt(walls_[2], result_.cell_m).phase) * result_.cell_m;
   }
 
   void Motion() {

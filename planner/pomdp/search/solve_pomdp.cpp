@@ -234,8 +234,7 @@ class Attempt {
 
   /// The policy of a search: `action_of(b)` is an index into the actions of a belief, or negative where it is not
   /// known. There, where the policy comes with a probability below `rare`, and where it is cut short for being too
-  /// large, it does as at another belief of its kind or, where there is none, goes on blindly. Nothing where that would
-  /// not reach a goal.
+  /// large, it goes on blindly. Nothing where that would not reach a goal.
   template <class ActionOf>
   std::optional<PomdpController> Freeze(PomdpBeliefGraph& graph, ActionOf action_of, double rare = 0.0) {
     const double give_up_s = GiveUp();
