@@ -73,7 +73,6 @@ std::string RankIdentity(const workflow::PlanningSetup& setup, const planner::Pr
 }
 
 planner::PreprocessOptions OptionsOf(const workflow::PlanningSetup& setup, planner::PreprocessOptions options) {
-  options.openings = setup.opening == env::Opening::kOpen;
   options.prior_deviation = setup.prior_deviation;
   return options;
 }

@@ -3,6 +3,7 @@
 #include <functional>
 #include <type_traits>
 
+#include "feeler/planner/policy/fit_workspace.h"
 #include "feeler/planner/policy/indistinguishable.h"
 #include "feeler/planner/search/bounded_search.h"
 #include "feeler/planner/search/given_policy.h"
@@ -24,16 +25,11 @@ constexpr std::uint32_t kGreedyBesideOpen = 256;
 constexpr std::uint64_t kFurtherPolicies = 120;
 constexpr double kGuessInflation = 1.3;
 
-bool Oriented(const SolveRun& run) { return run.graph.problem().map->orientations() > 1; }
+/// After this share of a limit a policy that leaves the workspace is given up: the rest is for the next attempt. (Not
+/// with orientations: a first policy alone may take more than that.)
+constexpr double kBeforeNextAttempt = 0.6;
 
-double BoundAtStart(const SolveRun& run) {
-  double bound = run.graph.Heuristic(run.start);
-  if (run.graph.problem().generous_workspace && run.tables.filled().bound) {
-    const SetId set = run.graph.set(run.start);
-    bound = std::max(bound, run.tables.filled().bound->Weighted(run.graph.sets(), set, run.graph.robot(run.start)));
-  }
-  return bound / run.weight;
-}
+bool Oriented(const SolveRun& run) { return run.graph.problem().map->orientations() > 1; }
 
 /// By what the greedy policy judges beliefs, where that is not the heuristic itself.
 std::function<double(BeliefId)> EstimateOf(SolveRun& run) {
@@ -91,17 +87,30 @@ std::optional<SolverStatus> CloseGapByTurns(SolveRun& run, Greedy& greedy, Searc
   return search.Run(run.start, stop);
 }
 
+/// Whether the policy that a search has found would have to be made anew: in canonical frames it may leave the
+/// workspace.
+template <class Search>
+bool LeavesWorkspace(SolveRun& run, Search& search) {
+  const PolicyGraph policy = run.Freeze(search);
+  return !StaysInWorkspace(run.graph.problem(), policy) && !FitIntoWorkspace(run.graph.problem(), policy);
+}
+
 /// From the incumbent's policy until cost and lower bound meet within the gap.
 template <class Incumbent>
 void CloseGap(SolveRun& run, Incumbent& incumbent) {
   SolverResult& result = run.result;
   BoundedSearch search(run.graph, incumbent, run.options.gap, Oriented(run) ? kGuessInflation : 1.0);
   const auto lower = [&] { return std::max(result.lower_bound, search.Lower(run.start) / run.weight); };
+  bool asked = !run.graph.canonical() || Oriented(run);
   const auto stop = [&](std::int64_t expansions) -> std::optional<SolverStatus> {
     const double upper = search.Upper(run.start) / run.weight;
     if (run.RowDue()) run.Row(search.trials(), expansions, lower(), upper);
     if (upper <= run.options.gap * lower()) return SolverStatus::kGap;
-    return run.Stop(expansions, search.bytes() + incumbent.bytes());
+    if (const auto why = run.Stop(expansions, search.bytes() + incumbent.bytes())) return why;
+    const auto spent = asked ? std::nullopt : run.watch.Spent(kBeforeNextAttempt, expansions);
+    if (!spent) return std::nullopt;
+    asked = true;
+    return LeavesWorkspace(run, search) ? spent : std::nullopt;
   };
   std::optional<SolverStatus> why;
   if constexpr (std::is_same_v<Incumbent, Greedy>) {
@@ -122,7 +131,7 @@ void CloseGap(SolveRun& run, Incumbent& incumbent) {
 /// The problem on the map whose dead ends are filled; none where there are none, or the tool is in one.
 std::optional<Problem> WithoutDeadEnds(const SolveRun& run) {
   const Problem& problem = run.graph.problem();
-  if (!problem.generous_workspace || !run.tables.filled().bound) return std::nullopt;
+  if (!problem.generous_workspace || !run.tables.filled().map) return std::nullopt;
   Problem without = problem;
   without.map = run.tables.filled().map;
   for (const Hypothesis& h : problem.hypotheses) {
@@ -138,7 +147,7 @@ void SolveWithOpenings(SolveRun& run, const Problem& filled, Greedy& greedy) {
   BeliefGraph filled_graph(filled, tables.tables->masks(), run.graph.canonical());
   const auto heuristic = tables.tables->MakeHeuristic(filled, filled_graph.sets());
   filled_graph.SetHeuristic(heuristic.get());
-  OpenPolicy open(run.graph, filled_graph, *tables.bound, greedy);
+  OpenPolicy open(run.graph, filled_graph, tables.openings, greedy);
   const auto why = open.Run(run.start, FirstPolicyStop(run, open));
   run.result.expansions = open.expansions();
   const bool small = run.graph.sets().info(run.graph.set(run.start)).size <= kGreedyBesideOpen;
@@ -154,7 +163,7 @@ void SolveWithOpenings(SolveRun& run, const Problem& filled, Greedy& greedy) {
 }  // namespace
 
 void SolveCertified(SolveRun& run) {
-  run.result.lower_bound = BoundAtStart(run);
+  run.result.lower_bound = run.graph.Heuristic(run.start) / run.weight;
   Greedy greedy(run.graph, EstimateOf(run));
   TakeKnown(run, greedy);
   if (const std::optional<Problem> filled = WithoutDeadEnds(run)) return SolveWithOpenings(run, *filled, greedy);

@@ -6,7 +6,6 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "feeler/planner/belief/hull.h"
 #include "feeler/planner/bounds/certificates/certificate.h"
 #include "feeler/planner/bounds/cuboids/cuboid_heuristic.h"
+#include "feeler/planner/bounds/openings/open_heuristic.h"
 #include "feeler/planner/contact/fill_dead_ends.h"
 
 namespace feeler::planner {
@@ -78,15 +78,8 @@ std::string KeyOf(const Problem& problem, const SolverOptions& options) {
 
 PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& options, Parallelism jobs,
                                const std::optional<ArrayStore>& store)
-    : map_(problem.map),
-      problem_(problem),
-      options_(options),
-      store_(store),
-      masks_(*problem.map, store ? &*store : nullptr) {
-  const ArrayStore* const kept = store_ ? &*store_ : nullptr;
-  options_.cancellation = nullptr;
-  options_.on_bounds = nullptr;
-  options_.on_tables = nullptr;
+    : masks_(*problem.map, store ? &*store : nullptr) {
+  const ArrayStore* const kept = store ? &*store : nullptr;
   const StepCosts costs = LowerStepCosts(problem.cost, problem.move_lengths.back());
   const StepCosts motions = MotionCosts(problem.cost, problem.move_lengths);
   pairs_ = std::make_shared<PairCertificates>(problem.map, motions, SpreadOf(problem));
@@ -127,7 +120,26 @@ PlanningTables::PlanningTables(const Problem& problem, const SolverOptions& opti
       break;
     case HeuristicKind::kFirstContact: first_contact_ = std::make_shared<FirstContactTable>(*problem.map, costs); break;
   }
-  if (options.solver == SolverKind::kCertified && problem.generous_workspace) filled();
+  if (options.solver == SolverKind::kCertified && problem.generous_workspace) {
+    FillDeadEndsOf(problem, options, jobs, kept);
+  }
+}
+
+void PlanningTables::FillDeadEndsOf(const Problem& problem, const SolverOptions& options, Parallelism jobs,
+                                    const ArrayStore* store) {
+  if (problem.map->orientations() > 1) return;
+  filled_.map = FillDeadEnds(*problem.map);
+  if (!filled_.map) return;
+  filled_.openings = FindOpenings(*problem.map, *filled_.map, 0);
+  Problem without = problem;
+  without.map = filled_.map;
+  SolverOptions with_certificates = options;
+  with_certificates.heuristic = HeuristicKind::kCertificate;
+  filled_.tables = BuildPlanningTables(without, with_certificates, jobs, store);
+  filled_.looks = std::make_shared<const LookTable>(
+      LookTable::Source{*filled_.map, filled_.tables->masks_, filled_.openings},
+      MotionCosts(problem.cost, problem.move_lengths), SpreadOf(problem), HullOf(problem.hypotheses).Size(), jobs,
+      options.on_tables, options.cancellation, store);
 }
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& problem,
@@ -139,6 +151,13 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristic(const Problem& pr
 
 std::unique_ptr<BeliefHeuristic> PlanningTables::MakeFullHeuristic(const Problem& problem,
                                                                    const HypothesisSets& sets) const {
+  std::unique_ptr<BeliefHeuristic> heuristic = MakeHeuristicAsIs(problem, sets);
+  if (!filled_.looks) return heuristic;
+  return std::make_unique<OpenHeuristic>(sets, std::move(heuristic), filled_.map, filled_.looks);
+}
+
+std::unique_ptr<BeliefHeuristic> PlanningTables::MakeHeuristicAsIs(const Problem& problem,
+                                                                   const HypothesisSets& sets) const {
   if (oriented_) return std::make_unique<OrientedHeuristic>(problem, sets, oriented_, oriented_pairs_, oriented_lines_);
   if (local_certificate_) return std::make_unique<LocalCertificateHeuristic>(problem, sets, *local_certificate_);
   if (lines_ && oriented_pairs_) return std::make_unique<LineHeuristic>(problem, sets, lines_, oriented_pairs_);
@@ -146,28 +165,6 @@ std::unique_ptr<BeliefHeuristic> PlanningTables::MakeFullHeuristic(const Problem
   if (first_contact_) return std::make_unique<FirstContactHeuristic>(sets, first_contact_);
   if (cuboids_) return std::make_unique<CuboidHeuristic>(sets, cuboids_, certificate_, pairs_);
   return std::make_unique<CertificateHeuristic>(sets, certificate_, pairs_);
-}
-
-const PlanningTables::Filled& PlanningTables::filled() const {
-  std::call_once(filled_once_, [&] {
-    // Bounds for openings are made for one orientation.
-    if (map_->orientations() == 1) filled_.map = FillDeadEnds(*map_);
-    if (!filled_.map) return;
-    Problem problem = problem_;
-    problem.map = filled_.map;
-    // The open bound looks at walks that begin in the middle of a move, so these may have any length.
-    problem.move_lengths.resize(static_cast<std::size_t>(problem.move_lengths.back()));
-    std::iota(problem.move_lengths.begin(), problem.move_lengths.end(), 1);
-    SolverOptions options = options_;
-    options.heuristic = HeuristicKind::kCertificate;  // the bound is made of them
-    filled_.tables = BuildPlanningTables(problem, options, Parallelism(), store_ ? &*store_ : nullptr);
-    if (!filled_.tables->certificate_) return;
-    filled_.bound =
-        std::make_shared<const OpenBound>(*map_, filled_.map, filled_.tables->masks_, filled_.tables->certificate_,
-                                          MotionCosts(problem_.cost, problem_.move_lengths), SpreadOf(problem_));
-  });
-  has_filled_ = true;
-  return filled_;
 }
 
 std::size_t PlanningTables::bytes() const {
@@ -184,10 +181,8 @@ std::size_t PlanningTables::bytes() const {
   add(lines_);
   add(first_contact_);
   add(local_certificate_);
-  if (has_filled_) {
-    add(filled_.tables);
-    add(filled_.bound);
-  }
+  add(filled_.tables);
+  add(filled_.looks);
   return bytes;
 }
 

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <memory>
-#include <mutex>
 #include <optional>
 
 #include "feeler/planner/arrays/array_store.h"
@@ -16,7 +14,8 @@
 #include "feeler/planner/bounds/certificates/pair_certificates.h"
 #include "feeler/planner/bounds/cuboids/cuboid_table.h"
 #include "feeler/planner/bounds/lines/lines.h"
-#include "feeler/planner/bounds/openings/open_bound.h"
+#include "feeler/planner/bounds/openings/look_table.h"
+#include "feeler/planner/bounds/openings/openings.h"
 #include "feeler/planner/bounds/orientations/oriented_heuristic.h"
 
 namespace feeler::planner {
@@ -36,23 +35,23 @@ class PlanningTables {
   /// The heuristic of a belief store of `problem`; the tables and the store must outlive it.
   std::unique_ptr<BeliefHeuristic> MakeHeuristic(const Problem& problem, const HypothesisSets& sets) const;
 
-  /// The map with its dead ends filled (see FillDeadEnds) and the tables for it; null if it has none. Made with the
-  /// tables of tasks for the certified solver, else when first asked for. Safe to call from many threads.
+  /// The map with its dead ends filled (see FillDeadEnds), the tables for it and where it was filled; the map is null
+  /// if it has none, and where they are not made: that is for tasks, one orientation and the certified solver.
   struct Filled {
     std::shared_ptr<const ContactMap> map;
     std::shared_ptr<const PlanningTables> tables;
-    std::shared_ptr<const OpenBound> bound;  ///< null without a table of certificates
+    Openings openings;
+    std::shared_ptr<const LookTable> looks;
   };
-  const Filled& filled() const;
+  const Filled& filled() const { return filled_; }
 
  private:
   std::unique_ptr<BeliefHeuristic> MakeFullHeuristic(const Problem& problem, const HypothesisSets& sets) const;
+  /// That of the map as it is, without what is known of its dead ends.
+  std::unique_ptr<BeliefHeuristic> MakeHeuristicAsIs(const Problem& problem, const HypothesisSets& sets) const;
+  void FillDeadEndsOf(const Problem& problem, const SolverOptions& options, Parallelism jobs, const ArrayStore* store);
 
-  std::shared_ptr<const ContactMap> map_;
-  Problem problem_;  ///< whose costs, goal and move lengths the tables are for
-  SolverOptions options_;
   double heuristic_share_ = 1.0;
-  std::optional<ArrayStore> store_;
   ContactMasks masks_;
   std::shared_ptr<const CertificateTable> certificate_;
   std::shared_ptr<const PairCertificates> pairs_;
@@ -64,9 +63,7 @@ class PlanningTables {
   std::shared_ptr<const LineTable> lines_;
   std::shared_ptr<const FirstContactTable> first_contact_;
   std::shared_ptr<const LocalCertificateTable> local_certificate_;  ///< for one problem: tables are not shared then
-  mutable std::once_flag filled_once_;
-  mutable std::atomic<bool> has_filled_{false};  ///< filled_ is ready
-  mutable Filled filled_;
+  Filled filled_;
 };
 
 }  // namespace feeler::planner

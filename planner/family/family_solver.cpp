@@ -13,9 +13,7 @@ FamilySolver::FamilySolver(const Task& task, std::shared_ptr<const ContactMap> m
                            const PreprocessOptions& options)
     : task_(task),
       map_(std::move(map)),
-      traits_{.openings = options.openings,
-              .orientations = LatticeOrientations(task) > 1,
-              .cells_per_axis = !task.cost.one_per_cell()},
+      traits_{.orientations = LatticeOrientations(task) > 1, .cells_per_axis = !task.cost.one_per_cell()},
       prior_deviation_(options.prior_deviation),
       solver_(options.solver),
       experience_(options.experience),

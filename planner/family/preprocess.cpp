@@ -25,11 +25,9 @@ constexpr std::size_t kLookAhead = 256;
 constexpr std::int64_t kDefaultExpansionLimit = 20000;
 constexpr std::int64_t kDefaultExpansionLimitOrientations = 60000;
 constexpr std::int64_t kDefaultExpansionLimitSmallOrientations = 200000;
-constexpr std::int64_t kDefaultExpansionLimitOpen = 500;
 constexpr std::int64_t kDefaultExpansionLimitPerAxis = 3000;
 
 std::int64_t DefaultExpansionLimit(const FamilyTraits& family, std::size_t hypotheses) {
-  if (family.openings) return kDefaultExpansionLimitOpen;
   if (!family.orientations) return family.cells_per_axis ? kDefaultExpansionLimitPerAxis : kDefaultExpansionLimit;
   return hypotheses <= kSmallOrientedHypotheses ? kDefaultExpansionLimitSmallOrientations
                                                 : kDefaultExpansionLimitOrientations;

@@ -30,7 +30,6 @@ class PolicySink {
 
 /// What a family is budgeted by.
 struct FamilyTraits {
-  bool openings = false;        ///< the opening of the target is open while localizing
   bool orientations = false;    ///< the orientation of the target is uncertain
   bool cells_per_axis = false;  ///< a cell does not cost the same along all axes
 };
@@ -40,9 +39,8 @@ inline constexpr int kSmallOrientedHypotheses = 600;
 
 /// The options that a problem of so many hypotheses in a family is solved with: the certified solver without any limit
 /// is given 20,000 expansions, so that one problem whose gap cannot be closed never holds up the family. With uncertain
-/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 60,000 above, where many stay open. 500
-/// where the map has openings: the first policy and the bound at the start are all there, and the search between them
-/// adds nothing. 3000 where cells cost by their axis: bounds are weaker there, and no policy of the plug's family came
+/// orientations 200,000 up to kSmallOrientedHypotheses, whose gaps close, and 60,000 above, where many stay open.
+/// 3000 where cells cost by their axis: bounds are weaker there, and no policy of the plug's family came
 /// of later expansions. At a gap below kTightGap it takes cuboids for certificates, unless told not to.
 SolverOptions WithFamilyBudget(SolverOptions solver, const FamilyTraits& family = {},
                                std::size_t hypotheses = std::numeric_limits<std::size_t>::max());
@@ -60,7 +58,6 @@ using DistantSolver = std::function<SolverResult(const Extents& extents, const s
 struct PreprocessOptions {
   /// Cancellation and on_bounds of it are ignored; limits as WithFamilyBudget completes them for each problem.
   SolverOptions solver;
-  bool openings = false;                ///< FamilyTraits::openings: the map does not tell
   std::vector<double> prior_deviation;  ///< of the hypotheses (WeighByPrior); empty: equally likely
   ProblemOrder order = ProblemOrder::kUncertainty;
   ExperienceKind experience = ExperienceKind::kRollout;  ///< for E-RTDP-Bel; other solvers use none

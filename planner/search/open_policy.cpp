@@ -16,7 +16,7 @@ constexpr std::size_t kMostExits = 32;
 
 }  // namespace
 
-OpenPolicy::OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const OpenBound& openings,
+OpenPolicy::OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const Openings& openings,
                        GreedyCompletion<BeliefGraph>& completion)
     : graph_(graph), filled_(filled), openings_(openings), completion_(completion), filled_policy_(filled) {}
 
@@ -86,15 +86,14 @@ GuardedMove OpenPolicy::WithLooks(BeliefId b, const GuardedMove& move, double va
   int nearest = move.cells;
   GuardedMove look = move;
   double weight = 0.0;
-  graph_.sets().ForEach(graph_.set(b), [&](const Cell& h, int orientation, std::uint32_t layer, int bit) {
-    const OpenBound::Openings& openings = openings_.openings(orientation);
-    for (std::size_t i = 0; i < openings.mouths.size(); ++i) {
-      const Cell way = h + openings.mouths[i] - robot;
+  graph_.sets().ForEach(graph_.set(b), [&](const Cell& h, int, std::uint32_t layer, int bit) {
+    for (std::size_t i = 0; i < openings_.mouths.size(); ++i) {
+      const Cell way = h + openings_.mouths[i] - robot;
       const int ahead = way.dot(step);
       if (ahead < 0 || ahead >= nearest || way != ahead * step) continue;
-      if (openings.directions[i] == move.direction) continue;  // looked into by the move itself
+      if (openings_.directions[i] == move.direction) continue;  // looked into by the move itself
       nearest = ahead;
-      look = {openings.directions[i], 1};
+      look = {openings_.directions[i], 1};
       weight = graph_.sets().Weight(layer, bit);
     }
   });
@@ -148,11 +147,10 @@ double OpenPolicy::Find(BeliefId b, bool tours) {
 
 std::vector<std::pair<Cell, Direction>> OpenPolicy::Order(BeliefId b, TourKind kind) const {
   std::map<std::tuple<int, int, int>, Direction> open;
-  graph_.sets().ForEach(graph_.set(b), [&](const Cell& h, int orientation, std::uint32_t, int) {
-    const OpenBound::Openings& openings = openings_.openings(orientation);
-    if (openings.mouths.empty()) return;
-    const Cell mouth = h + openings.mouths.front();
-    open.emplace(std::make_tuple(mouth.x(), mouth.y(), mouth.z()), openings.directions.front());
+  graph_.sets().ForEach(graph_.set(b), [&](const Cell& h, int, std::uint32_t, int) {
+    if (openings_.mouths.empty()) return;
+    const Cell mouth = h + openings_.mouths.front();
+    open.emplace(std::make_tuple(mouth.x(), mouth.y(), mouth.z()), openings_.directions.front());
   });
   std::vector<std::pair<Cell, Direction>> order;
   const Cell start = graph_.robot(b);
@@ -169,7 +167,7 @@ std::vector<std::pair<Cell, Direction>> OpenPolicy::Order(BeliefId b, TourKind k
         neighbours += open.contains({next.x(), next.y(), next.z()}) ? 1 : 0;
       }
       const int ring = (cell - start).cwiseAbs().maxCoeff();
-      const std::tuple<int, int, int> key{Distance(here, cell), kind == TourKind::kSpiral ? ring : neighbours,
+      const std::tuple<int, int, int> key{(cell - here).cwiseAbs().sum(), kind == TourKind::kSpiral ? ring : neighbours,
                                           kind == TourKind::kSpiral ? neighbours : ring};
       if (best == open.end() || key < best_key) {
         best = at;

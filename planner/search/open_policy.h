@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "feeler/planner/belief/belief_graph.h"
-#include "feeler/planner/bounds/openings/open_bound.h"
+#include "feeler/planner/bounds/openings/openings.h"
 #include "feeler/planner/search/greedy_completion.h"
 
 namespace feeler::planner {
@@ -26,7 +26,7 @@ namespace feeler::planner {
 class OpenPolicy {
  public:
   /// `filled` is the graph of the same problem on the filled map, with heuristic; both canonical or neither.
-  OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const OpenBound& openings,
+  OpenPolicy(BeliefGraph& graph, BeliefGraph& filled, const Openings& openings,
              GreedyCompletion<BeliefGraph>& completion);
 
   using StopCondition = std::function<std::optional<SolverStatus>(std::int64_t expansions)>;
@@ -99,7 +99,7 @@ class OpenPolicy {
 
   BeliefGraph& graph_;
   BeliefGraph& filled_;
-  const OpenBound& openings_;
+  const Openings& openings_;
   GreedyCompletion<BeliefGraph>& completion_;
   GreedyCompletion<BeliefGraph> filled_policy_;
   std::vector<State> nodes_;

@@ -12,12 +12,17 @@ double StopWatch::wall_s() const {
 }
 
 std::optional<SolverStatus> StopWatch::Stop(std::int64_t expansions) {
-  const double most = share_ * static_cast<double>(options_.expansion_limit);
-  if (static_cast<double>(expansions_before_ + expansions) >= most) return SolverStatus::kExpansionLimit;
+  ++calls_;
   if (options_.cancellation != nullptr && options_.cancellation->cancelled()) return SolverStatus::kCancelled;
-  if ((++calls_ & 63) != 0) return std::nullopt;
-  if (wall_s() >= share_ * options_.time_limit_s) return SolverStatus::kTimeLimit;
-  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= share_ * options_.cpu_limit_s) return SolverStatus::kTimeLimit;
+  return Spent(share_, expansions);
+}
+
+std::optional<SolverStatus> StopWatch::Spent(double share, std::int64_t expansions) const {
+  const double most = share * static_cast<double>(options_.expansion_limit);
+  if (static_cast<double>(expansions_before_ + expansions) >= most) return SolverStatus::kExpansionLimit;
+  if ((calls_ & 63) != 0) return std::nullopt;
+  if (wall_s() >= share * options_.time_limit_s) return SolverStatus::kTimeLimit;
+  if (std::isfinite(options_.cpu_limit_s) && cpu_s() >= share * options_.cpu_limit_s) return SolverStatus::kTimeLimit;
   return std::nullopt;
 }
 

@@ -23,6 +23,8 @@ class StopWatch {
   /// From now on limits hold at this share of what they are, in (0, 1]: for an attempt that must leave some to the
   /// next.
   void LimitTo(double share) { share_ = share; }
+  /// The limit of which so large a share is spent; empty if there is none. As seldom as `Stop` looks at the clock.
+  std::optional<SolverStatus> Spent(double share, std::int64_t expansions) const;
   /// An attempt is over, another may follow.
   void EndAttempt(std::int64_t expansions) { expansions_before_ += expansions; }
   std::int64_t expansions_before() const { return expansions_before_; }

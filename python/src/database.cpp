@@ -77,7 +77,6 @@ nb::tuple Preprocess(PlanningTask& task, const nb::object& family_given, const n
   planner::PreprocessOptions options;
   options.solver = ToSolverOptions(solver, token);
   options.solver.cancellation = nullptr;
-  options.openings = setup->opening == env::Opening::kOpen;
   if (order != "uncertainty" && order != "random")
     throw InputError("order", "unknown name \"" + order + "\"", "choose uncertainty or random");
   options.order = order == "random" ? planner::ProblemOrder::kRandom : planner::ProblemOrder::kUncertainty;

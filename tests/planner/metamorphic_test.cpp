@@ -72,7 +72,7 @@ TEST(Metamorphic, CanonicalTranslationIsExact) {
 TEST(Metamorphic, AnyBudgetGivesACompletePolicy) {
   const Task task = testing::MakePlugTask();
   const auto map = testing::MakePlugMap(true, {8, 7, 6});
-  const Problem problem = MakeCuboidProblem(task, map, {6, 6, 4});
+  const Problem problem = MakeCuboidProblem(task, map, {9, 8, 4});
   double last_cost = std::numeric_limits<double>::infinity();
   for (const std::int64_t limit : {1, 100, 10000}) {
     SolverOptions options = Exact();

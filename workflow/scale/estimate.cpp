@@ -129,9 +129,7 @@ double HalfError(const std::vector<double>& seconds, std::size_t half) {
 }  // namespace
 
 FamilyEstimate EstimateFamily(const PlanningSetup& setup, const planner::ProblemFamily& family,
-                              const planner::PreprocessOptions& given, std::int64_t sample) {
-  planner::PreprocessOptions options = given;
-  options.openings = setup.opening == env::Opening::kOpen;
+                              const planner::PreprocessOptions& options, std::int64_t sample) {
   FamilyEstimate estimate;
   const std::size_t count = family.problems.size();
   estimate.problems = static_cast<std::int64_t>(count);
@@ -167,9 +165,7 @@ FamilyEstimate EstimateFamily(const PlanningSetup& setup, const planner::Problem
 }
 
 FamilyEstimate EstimateFromTimes(const PlanningSetup& setup, const planner::ProblemFamily& family,
-                                 const planner::PreprocessOptions& given, policies::Database& measured) {
-  planner::PreprocessOptions options = given;
-  options.openings = setup.opening == env::Opening::kOpen;
+                                 const planner::PreprocessOptions& options, policies::Database& measured) {
   FamilyEstimate estimate;
   const std::vector<planner::Extents> order = LargestFirst(family);
   estimate.problems = std::ssize(order);

@@ -21,9 +21,7 @@ namespace feeler::workflow {
 namespace {
 
 planner::FamilyTraits TraitsOf(const PlanningSetup& setup) {
-  return {.openings = setup.opening == env::Opening::kOpen,
-          .orientations = LatticeOrientations(setup.task()) > 1,
-          .cells_per_axis = !setup.task().cost.one_per_cell()};
+  return {.orientations = LatticeOrientations(setup.task()) > 1, .cells_per_axis = !setup.task().cost.one_per_cell()};
 }
 
 /// Null where there is no limit: JSON has no infinity.
@@ -78,7 +76,6 @@ DatabaseBuild BuildDatabase(const PlanningSetup& setup, const planner::ProblemFa
   identity.shard = shard;
   policies::Database database = policies::Database::OpenOrCreate(path, identity);
   planner::PreprocessOptions of_setup = options;
-  of_setup.openings = setup.opening == env::Opening::kOpen;
   of_setup.prior_deviation = setup.prior_deviation;
   policies::DatabaseSink sink(database, options.solver);
   DatabaseBuild build;

@@ -130,12 +130,13 @@ std::vector<std::pair<Problem, HeuristicKind>> Cases() {
   Problem flat = MakeCuboidProblem(plug, testing::MakePlugMap(false, {6, 5, 4}), {4, 3, 3});
   Problem moves = flat;
   moves.cost.per_action = 0.5;
+  const Problem open = MakeCuboidProblem(plug, testing::MakePlugMap(true, {6, 5, 4}), {4, 3, 3});
   const Task pipe = testing::MakePipeTask(2, 2);
   const Problem oriented = MakeCuboidProblem(pipe, testing::MakePipeMap(pipe, 0.25), {2, 2, 1, 2, 2});
-  return {{flat, HeuristicKind::kCertificate},  {flat, HeuristicKind::kCuboids},
-          {moves, HeuristicKind::kCuboids},     {flat, HeuristicKind::kLines},
-          {moves, HeuristicKind::kCertificate}, {oriented, HeuristicKind::kCertificate},
-          {oriented, HeuristicKind::kLines}};
+  return {{open, HeuristicKind::kCertificate},     {flat, HeuristicKind::kCertificate},
+          {flat, HeuristicKind::kCuboids},         {moves, HeuristicKind::kCuboids},
+          {flat, HeuristicKind::kLines},           {moves, HeuristicKind::kCertificate},
+          {oriented, HeuristicKind::kCertificate}, {oriented, HeuristicKind::kLines}};
 }
 
 TEST_F(ArrayStoreTest, TablesThatAreSharedAreThoseMadeAlone) {
