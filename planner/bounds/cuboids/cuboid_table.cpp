@@ -49,23 +49,18 @@ struct CuboidTable::Scratch {
 CuboidTable::CuboidTable(const ContactMap& map, const ContactMasks& masks, const CertificateTable& certificates,
                          const StepCosts& costs, const Cell& spread, const Cell& largest, Parallelism jobs,
                          const CancellationToken* cancellation, const ArrayStore* store)
-    : spread_(spread), largest_(largest.cwiseMin(kLongest)) {
+    : grid_(ActiveRegion(map)), spread_(spread), largest_(largest.cwiseMin(kLongest)) {
   const TableUnits units(costs);
   unit_ = units.unit;
   free_units_ = units.free_units;
   contact_units_ = units.contact_units;
-  const ActiveRegion region(map);
-  active_ = {region.box.min - Cell::Ones(), region.box.max + Cell::Ones()};
-  mirrored_ = region.mirrored;
-  free_above_ = region.free_above;
-  free_below_ = region.free_below;
   FitIntoMemory(map.orientations());
   planes_.resize(static_cast<std::size_t>(largest_.prod() * map.orientations()));
   std::vector<SharedArray<std::uint32_t>*> all;
   ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
     for (int o = 0; o < map.orientations() && !Goal(size); ++o) {
       Plane& plane = planes_[PlaneIndex(size, o)];
-      plane = Shape(size);
+      plane = {grid_.ShapeOf(size), {}};
       all.push_back(&plane.values);
     }
   });
@@ -99,18 +94,8 @@ bool CuboidTable::FillAll(const ContactMap& map, const Source& source, Paralleli
 void CuboidTable::FillFlags(const ContactMap& map) {
   for (int o = 0; o < map.orientations(); ++o) {
     std::vector<std::uint8_t>& flags = flags_.emplace_back();
-    ForEachCell(active_, [&](const Cell& here) { flags.push_back(StepFlags(map, here, o)); });
+    ForEachCell(grid_.active, [&](const Cell& here) { flags.push_back(StepFlags(map, here, o)); });
   }
-}
-
-CuboidTable::Plane CuboidTable::Shape(const Cell& size) const {
-  Plane plane;
-  plane.whole = active_.Size() + size - Cell::Ones();
-  plane.stored = plane.whole;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (mirrored_[static_cast<std::size_t>(axis)]) plane.stored[axis] = (plane.whole[axis] + 1) / 2;
-  }
-  return plane;
 }
 
 void CuboidTable::FitIntoMemory(int orientations) {
@@ -118,9 +103,7 @@ void CuboidTable::FitIntoMemory(int orientations) {
     std::size_t bytes = 0;
     ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
       if (Goal(size)) return;
-      const Cell stored = Shape(size).stored;
-      bytes += static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
-               static_cast<std::size_t>(stored.z()) * sizeof(std::uint32_t) * static_cast<std::size_t>(orientations);
+      bytes += grid_.ShapeOf(size).Cells() * sizeof(std::uint32_t) * static_cast<std::size_t>(orientations);
     });
     if (bytes <= kMostBytes || largest_.maxCoeff() <= 1) return;
     largest_ = largest_.cwiseMin(largest_.maxCoeff() - 1);
@@ -130,23 +113,10 @@ void CuboidTable::FitIntoMemory(int orientations) {
 std::uint32_t CuboidTable::At(const Cell& displacement, const Cell& size, int orientation) const {
   if (Goal(size)) return 0;
   const Plane& plane = planes_[PlaneIndex(size, orientation)];
-  Cell cell = displacement - active_.min;
-  int beyond = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    if (cell[axis] < 0) {
-      if (free_below_[i]) beyond -= cell[axis];
-      cell[axis] = 0;
-    } else if (cell[axis] >= plane.whole[axis]) {
-      if (free_above_[i]) beyond += cell[axis] - plane.whole[axis] + 1;
-      cell[axis] = plane.whole[axis] - 1;
-    }
-    if (cell[axis] >= plane.stored[axis]) cell[axis] = plane.whole[axis] - 1 - cell[axis];
-  }
-  const std::uint32_t value = plane.values[static_cast<std::size_t>(
-      (std::int64_t{cell.z()} * plane.stored.y() + cell.y()) * plane.stored.x() + cell.x())];
+  const BoxGrid::Place place = grid_.PlaceOf(plane, displacement);
+  const std::uint32_t value = plane.values[place.index];
   if (value == kUnreachable) return value;
-  return value + static_cast<std::uint32_t>(beyond * size.prod()) * free_units_;
+  return value + static_cast<std::uint32_t>(place.beyond * size.prod()) * free_units_;
 }
 
 std::uint64_t CuboidTable::Certificates(const Source& source, const std::vector<Bits256>& layers,
@@ -195,7 +165,7 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
   Plane& plane = planes_[PlaneIndex(size, orientation)];
   const Cell& stored = plane.stored;
   // The OR over the cuboid of the flags of its hypotheses.
-  Cell shape = active_.Size();
+  Cell shape = grid_.active.Size();
   scratch.flags = flags_[static_cast<std::size_t>(orientation)];
   for (int axis = 0; axis < 3; ++axis) {
     const Cell before = shape;
@@ -203,9 +173,7 @@ void CuboidTable::Fill(const Source& source, const Cell& size, int orientation, 
     OrAlong(axis, size[axis], before, scratch.flags, shape, scratch.buffer);
     scratch.flags.swap(scratch.buffer);
   }
-  std::vector<std::uint32_t> values(static_cast<std::size_t>(stored.x()) * static_cast<std::size_t>(stored.y()) *
-                                        static_cast<std::size_t>(stored.z()),
-                                    kUnreachable);
+  std::vector<std::uint32_t> values(plane.Cells(), kUnreachable);
   SplittingSteps(source, size, orientation, plane, values, scratch);
   SilentSteps(static_cast<std::uint32_t>(size.prod()) * free_units_, stored, scratch.flags, values);
   plane.values = std::move(values);
@@ -228,7 +196,7 @@ void CuboidTable::SplittingSteps(const Source& source, const Cell& size, int ori
       flags = kBlockedSteps;
       return;
     }
-    const Cell displacement = active_.min + cell;
+    const Cell displacement = grid_.active.min + cell;
     std::uint32_t& best = values[here];
     for (const Direction d : kDirections) {
       const unsigned bit = 1U << IndexOf(d);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -10,6 +9,7 @@
 #include "feeler/planner/arrays/array_store.h"
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/contact_masks.h"
+#include "feeler/planner/bounds/box_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
 #include "feeler/planner/bounds/cuboids/box_partition.h"
@@ -49,9 +49,7 @@ class CuboidTable {
   std::size_t bytes() const;
 
  private:
-  struct Plane {
-    Cell whole = Cell::Zero();   ///< cells of the grid
-    Cell stored = Cell::Zero();  ///< of them up to the middle along mirrored axes
+  struct Plane : BoxGrid::Shape {
     SharedArray<std::uint32_t> values;
   };
   struct Scratch;
@@ -65,7 +63,6 @@ class CuboidTable {
     return static_cast<std::size_t>(((orientation * largest_.z() + c.z()) * largest_.y() + c.y()) * largest_.x() +
                                     c.x());
   }
-  Plane Shape(const Cell& size) const;
   void FitIntoMemory(int orientations);
   void FillFlags(const ContactMap& map);
   void Fill(const Source& source, const Cell& size, int orientation, Scratch& scratch);
@@ -84,11 +81,7 @@ class CuboidTable {
   std::uint64_t Certificates(const Source& source, const std::vector<Bits256>& layers, const HypothesisBox& box,
                              const Cell& displacement, int orientation) const;
 
-  CellBox active_;  ///< displacements of one hypothesis beyond which the map repeats, and one cell more
-  std::array<bool, 3> mirrored_{};
-  /// Per axis: nothing is blocked beyond the active box, above and below. Who starts there has to come back.
-  std::array<bool, 3> free_above_{};
-  std::array<bool, 3> free_below_{};
+  BoxGrid grid_;
   Cell spread_;
   Cell largest_;
   double unit_ = 1.0;

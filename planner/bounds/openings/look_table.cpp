@@ -142,7 +142,7 @@ class LookTable::Filler {
     std::size_t at = 0;
     ForEachCell({Cell::Zero(), plane_->stored - Cell::Ones()}, [&](const Cell& cell) {
       const std::size_t here = at++;
-      const Cell displacement = table_.active_.min + cell;
+      const Cell displacement = table_.grid_.active.min + cell;
       const Bits256 inside = Inside(displacement);
       if (inside.Any()) {
         PrepareInside(here, displacement, inside);
@@ -254,12 +254,11 @@ class LookTable::Filler {
       costs[static_cast<std::size_t>(k)] = (count - k) * payment.step;
     }
     if (plane.most > 0) {
-      int beyond = 0;
-      const std::size_t cell = table_.CellOf(plane, displacement - box.low, beyond);
+      const BoxGrid::Place place = table_.grid_.PlaceOf(plane, displacement - box.low);
       for (int k = 0; k < plane.most; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        const double rest = plane.values[cell * static_cast<std::size_t>(plane.most) + i] * plane.unit +
-                            beyond * (count - k) * table_.costs_.free;
+        const double rest = plane.values[place.index * static_cast<std::size_t>(plane.most) + i] * plane.unit +
+                            place.beyond * (count - k) * table_.costs_.free;
         costs[i] += std::max(0.0, rest - (count - k) * payment.before);
       }
     }
@@ -406,24 +405,22 @@ class LookTable::Filler {
 LookTable::LookTable(const Source& source, const StepCosts& costs, const Cell& spread, const Cell& largest,
                      Parallelism jobs, const ProgressCallback& progress, const CancellationToken* cancellation,
                      const ArrayStore* store)
-    : spread_(spread), largest_(largest.cwiseMin(Cell(kLongest, kLongest, 1))), costs_(costs) {
-  const ActiveRegion region(source.filled);
-  active_ = {region.box.min - Cell::Ones(), region.box.max + Cell::Ones()};
-  mirrored_ = region.mirrored;
-  mirrored_[2] = false;  // what lies below the mouths never does above
-  highest_ = active_.min.z();
+    : grid_(ActiveRegion(source.filled)),
+      spread_(spread),
+      largest_(largest.cwiseMin(Cell(kLongest, kLongest, 1))),
+      costs_(costs) {
+  grid_.mirrored[2] = false;  // what lies below the mouths never does above
+  highest_ = grid_.active.min.z();
   ForEachCell(source.filled.domain(), [&](const Cell& cell) {
     if (source.filled.Blocked(cell)) highest_ = std::max(highest_, cell.z());
   });
-  free_above_ = region.free_above;
-  free_below_ = region.free_below;
   const std::vector<Cell>& mouths = source.openings.mouths;
   for (const Cell& mouth : mouths) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       Cell image = mouth;
       const auto i = static_cast<Eigen::Index>(axis);
-      image[i] = active_.min[i] + active_.max[i] - mouth[i];
-      mirrored_[axis] = mirrored_[axis] && std::ranges::find(mouths, image) != mouths.end();
+      image[i] = grid_.active.min[i] + grid_.active.max[i] - mouth[i];
+      grid_.mirrored[axis] = grid_.mirrored[axis] && std::ranges::find(mouths, image) != mouths.end();
     }
   }
   FitIntoMemory();
@@ -443,17 +440,12 @@ LookTable::LookTable(const Source& source, const StepCosts& costs, const Cell& s
   store->Keep("looks", values);
 }
 
-LookTable::Plane LookTable::Shape(const Cell& size) const {
-  Plane plane;
+LookTable::Plane LookTable::PlaneOf(const Cell& size) const {
+  Plane plane{grid_.ShapeOf(size), 0, 1.0, {}};
   const int left = size.x() - 1 <= spread_.x() && size.y() - 1 <= spread_.y()
                        ? size.x() * size.y()
                        : (spread_.x() + 1) * (spread_.y() + 1);  // what a goal may leave
   plane.most = std::clamp(size.x() * size.y() - left, 0, kMostLooks);
-  plane.whole = active_.Size() + Cell(size.x() - 1, size.y() - 1, 0);
-  plane.stored = plane.whole;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (mirrored_[static_cast<std::size_t>(axis)]) plane.stored[axis] = (plane.whole[axis] + 1) / 2;
-  }
   return plane;
 }
 
@@ -462,7 +454,7 @@ void LookTable::FitIntoMemory() {
     planes_.clear();
     std::size_t bytes = 0;
     ForEachCell({Cell::Ones(), largest_}, [&](const Cell& size) {
-      const Plane& plane = planes_.emplace_back(Shape(size));
+      const Plane& plane = planes_.emplace_back(PlaneOf(size));
       bytes += plane.Cells() * static_cast<std::size_t>(plane.most) * sizeof(std::uint16_t);
     });
     if (bytes <= kMostBytes || largest_.maxCoeff() <= 1) return;
@@ -503,30 +495,12 @@ bool LookTable::FillAll(const Source& source, Parallelism jobs, const ProgressCa
   return true;
 }
 
-std::size_t LookTable::CellOf(const Plane& plane, const Cell& displacement, int& beyond) const {
-  Cell cell = displacement - active_.min;
-  beyond = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    if (cell[axis] < 0) {
-      if (free_below_[i]) beyond -= cell[axis];
-      cell[axis] = 0;
-    } else if (cell[axis] >= plane.whole[axis]) {
-      if (free_above_[i]) beyond += cell[axis] - plane.whole[axis] + 1;
-      cell[axis] = plane.whole[axis] - 1;
-    }
-    if (cell[axis] >= plane.stored[axis]) cell[axis] = plane.whole[axis] - 1 - cell[axis];
-  }
-  return GridIndex(plane.stored, cell);
-}
-
 double LookTable::At(const Cell& displacement, const Cell& size, int gone) const {
   const Plane& plane = planes_[PlaneIndex(size)];
   if (gone >= plane.most) return 0.0;
-  int beyond = 0;
-  const std::size_t cell = CellOf(plane, displacement, beyond);
-  const std::size_t i = cell * static_cast<std::size_t>(plane.most) + static_cast<std::size_t>(gone);
-  return plane.values[i] * plane.unit + beyond * (size.x() * size.y() - gone) * costs_.free;
+  const BoxGrid::Place place = grid_.PlaceOf(plane, displacement);
+  const std::size_t i = place.index * static_cast<std::size_t>(plane.most) + static_cast<std::size_t>(gone);
+  return plane.values[i] * plane.unit + place.beyond * (size.x() * size.y() - gone) * costs_.free;
 }
 
 std::size_t LookTable::bytes() const {

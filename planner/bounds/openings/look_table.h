@@ -1,9 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "feeler/core/lattice.h"
@@ -13,6 +11,7 @@
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/bits256.h"
 #include "feeler/planner/belief/contact_masks.h"
+#include "feeler/planner/bounds/box_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/openings/openings.h"
 #include "feeler/planner/contact/contact_map.h"
@@ -58,32 +57,23 @@ class LookTable {
   std::size_t bytes() const;
 
  private:
-  struct Plane {
-    Cell whole = Cell::Zero();   ///< cells of the grid
-    Cell stored = Cell::Zero();  ///< of them up to the middle along mirrored axes
-    int most = 0;                ///< entries of a cell, by the number gone; with more gone nothing is left to pay
-    double unit = 1.0;           ///< cost that a value counts in
+  struct Plane : BoxGrid::Shape {
+    int most = 0;       ///< entries of a cell, by the number gone; with more gone nothing is left to pay
+    double unit = 1.0;  ///< cost that a value counts in
     SharedArray<std::uint16_t> values;
-    std::size_t Cells() const { return static_cast<std::size_t>(stored.cast<std::int64_t>().prod()); }
   };
   class Filler;
 
   std::size_t PlaneIndex(const Cell& size) const {
     return static_cast<std::size_t>((size.y() - 1) * largest_.x() + size.x() - 1);
   }
-  Plane Shape(const Cell& size) const;
+  Plane PlaneOf(const Cell& size) const;
   void FitIntoMemory();
   /// All planes from smaller to larger rectangles; false after a cancellation.
   bool FillAll(const Source& source, Parallelism jobs, const ProgressCallback& progress,
                const CancellationToken* cancellation);
-  /// Where a plane keeps a displacement, and how many cells of way back lie between.
-  std::size_t CellOf(const Plane& plane, const Cell& displacement, int& beyond) const;
 
-  CellBox active_;  ///< displacements of one hypothesis beyond which the map repeats, and one cell more
-  std::array<bool, 3> mirrored_{};
-  /// Per axis: nothing is blocked beyond the active box, above and below. Who starts there has to come back.
-  std::array<bool, 3> free_above_{};
-  std::array<bool, 3> free_below_{};
+  BoxGrid grid_;
   int highest_ = 0;  ///< greatest z of a displacement inside the filled target
   Cell spread_;
   Cell largest_;
