@@ -9,9 +9,9 @@
 #include "feeler/planner/arrays/array_store.h"
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/contact_masks.h"
-#include "feeler/planner/bounds/box_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_table.h"
+#include "feeler/planner/bounds/cuboids/box_grid.h"
 #include "feeler/planner/bounds/cuboids/box_partition.h"
 #include "feeler/planner/contact/contact_map.h"
 

@@ -11,8 +11,8 @@
 #include "feeler/planner/arrays/shared_array.h"
 #include "feeler/planner/belief/bits256.h"
 #include "feeler/planner/belief/contact_masks.h"
-#include "feeler/planner/bounds/box_grid.h"
 #include "feeler/planner/bounds/certificates/certificate_grid.h"
+#include "feeler/planner/bounds/cuboids/box_grid.h"
 #include "feeler/planner/bounds/openings/openings.h"
 #include "feeler/planner/contact/contact_map.h"
 
